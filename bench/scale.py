@@ -78,8 +78,8 @@ def _digest(_: Path) -> Callable[[Path], object]:
 
 
 def _decode(_: Path) -> Callable[[Path], object]:
+    from seal_friction_ros.offline.bags.actuator_bag import find_topics
     from seal_friction_ros.offline.bags.block_reader import compile_now, read_in_bulk
-    from seal_friction_ros.offline.bags.topics import find_topics
     from seal_friction_ros.offline.replay.compiled_replay import kinds_of_topics
 
     def decode(bag: Path) -> None:

@@ -40,7 +40,9 @@ ROOMS = {  # in order; rooms on one line do not import from each other
     ),
 }
 MOST_ENTRIES = 10  # of core and of offline: what a newcomer reads at a glance
-SHARED_WITH_NODES = {f'{PACKAGE}.offline.{part}' for part in ('bags.recorder', 'bags.bag', 'monitor')}
+SHARED_WITH_NODES = {
+    f'{PACKAGE}.offline.{part}' for part in ('bags.recorder', 'bags.bag', 'bags.definitions', 'monitor')
+}
 
 
 def imported(source: str) -> set[str]:

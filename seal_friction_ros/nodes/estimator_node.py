@@ -67,7 +67,8 @@ from seal_friction_ros.nodes.input_watch import InputWatch
 from seal_friction_ros.nodes.managed_node import OVERDUE, ManagedNode, message_class
 from seal_friction_ros.nodes.recording import Recording
 from seal_friction_ros.nodes.subscription import with_source_time
-from seal_friction_ros.offline.bags.bag import STATE_NAME, STATE_TYPE, message_definition
+from seal_friction_ros.offline.bags.bag import STATE_NAME, STATE_TYPE
+from seal_friction_ros.offline.bags.definitions import message_definition
 
 SWITCH_INTERVAL = 5e-5  # [s] longest time that the recorder thread delays a sample; Python's default is 5 ms
 _OPTIONAL_INPUTS = ('servo_reference', 'rod_position', 'seal_temperature')  # without them there are good estimates

@@ -31,7 +31,7 @@ from seal_friction_ros.core.machine.newest_messages import NEWEST_TYPE
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.executor import run
 from seal_friction_ros.nodes.managed_node import message_class
-from seal_friction_ros.offline.bags.bag import message_definition
+from seal_friction_ros.offline.bags.definitions import message_definition
 from seal_friction_ros.offline.monitor.live_view import RATE, LiveView, Wanted
 from seal_friction_ros.offline.monitor.node_view import NodeView
 from seal_friction_ros.offline.monitor.off_latch import ANSWER_TIMEOUT, Answer

@@ -17,7 +17,7 @@ from seal_friction_ros.core.estimation.records import Force, Position, Pressure,
 from seal_friction_ros.core.servo.motions import Sine, Wave
 from seal_friction_ros.core.servo.position_servo import ServoParameters, init, outputs, step
 from seal_friction_ros.offline.bags import bag as b
-from seal_friction_ros.offline.bags.topics import ANSWER_TOPICS
+from seal_friction_ros.offline.bags.actuator_bag import ANSWER_TOPICS
 
 RATE = 1000  # [Hz]
 START = 1_700_000_000_000_000_000  # [ns]

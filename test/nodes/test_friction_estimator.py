@@ -36,8 +36,8 @@ from seal_friction_ros.core.estimation.records import Velocity
 from seal_friction_ros.core.friction.actuator import actuator_friction
 from seal_friction_ros.files import default_configuration, load_parameter_file
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
+from seal_friction_ros.offline.bags.actuator_bag import find_topics
 from seal_friction_ros.offline.bags.bag import bag_topics, read_messages
-from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.replay.replay import replay
 from seal_friction_ros.offline.replay.shared_replay import stretches_of, verify_stretches
 

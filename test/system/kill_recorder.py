@@ -29,9 +29,9 @@ from seal_friction_ros.core.estimation.pipeline import answered, init
 from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.bags import bag as b
+from seal_friction_ros.offline.bags.actuator_bag import ANSWER_TOPICS
 from seal_friction_ros.offline.bags.recorder import Recorder
 from seal_friction_ros.offline.bags.recover import recover
-from seal_friction_ros.offline.bags.topics import ANSWER_TOPICS
 from seal_friction_ros.offline.replay.replay import replay
 
 PERIOD = 1_000_000  # [ns]

@@ -26,8 +26,8 @@ from seal_friction_ros.core.estimation.pipeline import answered, init
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.nodes.estimator_node import SWITCH_INTERVAL
 from seal_friction_ros.offline.bags import mcap_writer
+from seal_friction_ros.offline.bags.actuator_bag import ANSWER_TOPICS
 from seal_friction_ros.offline.bags.recorder import Recorder
-from seal_friction_ros.offline.bags.topics import ANSWER_TOPICS
 
 P99 = 'p99 [ms]'
 LARGEST_RATIO = 1.10

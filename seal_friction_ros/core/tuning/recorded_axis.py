@@ -14,7 +14,6 @@ of the sliding samples but for the largest `NOISE_SHARE`, whichever is larger. A
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -28,8 +27,8 @@ from seal_friction_ros.core.estimation.feedforward import (
     usable,
     wanted_velocity,
 )
-from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
-from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
+from seal_friction_ros.core.estimation.records import NO_ESTIMATE, Status
+from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, RobustnessCase, TunedFeedForward
 from seal_friction_ros.core.tuning.simulated_axis import bounded, force_limit, nearest_preferred, preferred
@@ -47,42 +46,23 @@ SLOW_SHARE = 0.01  # of the sliding samples: so many must be slower than an iden
 NOISE_SHARE = 0.01  # of the sliding samples: larger frictions count as noise
 
 
-class RecordedMotion(NamedTuple):
-    """Reference and rod at one velocity sample."""
-
-    reference_velocity: float  # [m/s] conditioned, as in `pipeline`
-    reference_acceleration: float = 0.0  # [m/s^2]
-    measured_velocity: float = 0.0  # [m/s]
-    reference_age: float = 0.0  # [s]
-
-
 class Recording(NamedTuple):
-    """Recorded motion of an axis, one entry per velocity sample."""
+    """Recorded motion of an axis: arrays of shape (n,), one entry per velocity sample."""
 
-    estimates: Sequence[FrictionEstimate]
-    motions: Sequence[RecordedMotion]  # reference and measured motion
-    force_sum: FloatArray  # [N], shape (n,)
+    stamps: IntArray  # [ns]
+    state: IntArray  # of the estimate, as the next two
+    status: IntArray
+    coulomb_friction: FloatArray  # [N]
+    velocity: FloatArray  # [m/s] of the rod
+    force_sum: FloatArray  # [N]
+    reference_velocity: FloatArray  # [m/s] conditioned, as in `pipeline`
+    reference_acceleration: FloatArray  # [m/s^2]
+    reference_age: FloatArray  # [s]
 
     @property
     def time(self) -> FloatArray:
         """Time since the first sample [s], shape (n,)."""
-        first = self.estimates[0].stamp
-        return np.array([(estimate.stamp - first) * 1e-9 for estimate in self.estimates])
-
-    @property
-    def velocity(self) -> FloatArray:
-        """Rod velocity [m/s], shape (n,)."""
-        return np.array([motion.measured_velocity for motion in self.motions])
-
-    @property
-    def reference_velocity(self) -> FloatArray:
-        """Reference velocity [m/s], shape (n,)."""
-        return np.array([motion.reference_velocity for motion in self.motions])
-
-    @property
-    def coulomb_friction(self) -> FloatArray:
-        """Estimated Coulomb friction [N], shape (n,)."""
-        return np.array([estimate.coulomb_friction for estimate in self.estimates])
+        return np.asarray((self.stamps - self.stamps[0]) * 1e-9)
 
 
 class RecordedLaw(NamedTuple):
@@ -154,10 +134,8 @@ def fit_law(recording: Recording, mass: float | None = None) -> RecordedLaw:
     Raises:
         ValueError: The rod slides too little, or with too little variety to separate the terms.
     """
-    velocity = recording.velocity
+    velocity, state, status = recording.velocity, recording.state, recording.status
     slope = acceleration(recording.time, velocity)
-    state = np.array([estimate.state for estimate in recording.estimates])
-    status = np.array([estimate.status for estimate in recording.estimates], np.int64)
     speed = np.abs(velocity)
     slow = speed < SLOW * np.max(speed[np.isfinite(speed)], initial=0.0)
     usable = (status & UNUSABLE == 0) & ~(slow & (status & int(Status.MOTION_UNCERTAIN) != 0))
@@ -209,15 +187,21 @@ def near_reversals(time: FloatArray, reference_velocity: FloatArray) -> BoolArra
 
 def feedforward_force(settings: FeedForwardSettings, recording: Recording, friction_error: float = 0.0) -> FloatArray:
     """Feed-forward force along a recording [N], shape (n,), with a relative error of the friction model."""
+    grounds = list(zip(recording.status.tolist(), recording.state.tolist(), strict=True))
+    is_usable = {one: usable(settings, NO_ESTIMATE._replace(status=one[0], state=one[1])) for one in set(grounds)}
+    columns = recording.stamps, recording.coulomb_friction, recording.velocity
+    references = recording.reference_velocity, recording.reference_acceleration, recording.reference_age
     state, forces = FADED_IN, []
-    for estimate, motion in zip(recording.estimates, recording.motions, strict=True):
-        friction = (1.0 + friction_error) * estimate.coulomb_friction if usable(settings, estimate) else -1.0
-        velocity = motion.measured_velocity
+    for ground, stamp, coulomb, measured, *reference in zip(
+        grounds, *(column.tolist() for column in (*columns, *references)), strict=True
+    ):
+        friction = (1.0 + friction_error) * coulomb if is_usable[ground] else -1.0
+        velocity = measured
         if not settings.use_measured_velocity:
-            late = abs(motion.reference_age) > settings.reference_timeout
-            ahead = wanted_velocity(settings, motion.reference_velocity, motion.reference_acceleration)
-            velocity = math.nan if late else ahead
-        state, out = feedforward.step(settings, state, estimate.stamp, estimate.stamp, friction, velocity)
+            *motion, age = reference
+            late = abs(age) > settings.reference_timeout
+            velocity = math.nan if late else wanted_velocity(settings, *motion)
+        state, out = feedforward.step(settings, state, stamp, stamp, friction, velocity)
         forces.append(out.force)
     return np.array(forces)
 

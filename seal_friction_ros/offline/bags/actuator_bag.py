@@ -7,210 +7,142 @@ node makes of the same messages, at their log times.
 """
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation import messages as m
-from seal_friction_ros.core.estimation.configuration import Configuration, Recorded, snapshot_text
+from seal_friction_ros.core.estimation.configuration import Recorded, snapshot_text
 from seal_friction_ros.core.estimation.message_blocks import Messages
-from seal_friction_ros.core.estimation.records import Clock
 from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, decode_together
-from seal_friction_ros.core.machine.machine import (
-    QUANTITIES,
-    Machine,
-    MachineActuator,
-    MachineState,
-    init,
-    make_machine,
-    receive,
-    records_of,
-    stamp_of,
-)
-from seal_friction_ros.core.machine.machine_file import MachineFile, parse_machine
-from seal_friction_ros.core.machine.machine_snapshot import (
-    MachineSnapshot,
-    machine_of,
-    machine_text,
-    parse_machine_text,
-    snapshot_of,
-)
-from seal_friction_ros.core.machine.message_fields import short_name
-from seal_friction_ros.files import machine_configurations, read_machine
+from seal_friction_ros.core.machine.machine import QUANTITIES, Machine, MachineActuator, MachineState
+from seal_friction_ros.core.machine.machine_snapshot import MachineSnapshot, machine_of, parse_machine_text
 from seal_friction_ros.offline.bags.bag import (
+    CONFIGURATION_TOPIC,
+    ESTIMATE_TOPIC,
+    FEEDFORWARD_TOPIC,
+    STATE_NAME,
+    TEMPERATURE_TOPIC,
     BagError,
     BagMessage,
+    KindOf,
     TopicInfo,
     bag_topics,
+    gathered,
+    named,
+    read_definitions,
     read_messages,
 )
-from seal_friction_ros.offline.bags.definitions import read_definitions
-from seal_friction_ros.offline.bags.gathered import KindOf, gathered
-from seal_friction_ros.offline.bags.topics import RECORDED, TYPES, Topics, find_topics
+from seal_friction_ros.offline.bags.mapped_bag import (
+    LAST_PART,
+    MappingFile,
+    Translation,
+    is_for,
+    lacking,
+    machine_in,
+    machine_messages,
+)
 
-MACHINE_CONFIGURATION = '/machine_estimator/configuration'
-LARGEST_CLOCK_STEP = 1_000_000_000  # [ns] stamps further from the log time are of another clock; our choice
-_LAST_PARTS = {**m.INPUTS, **m.OUTPUTS, 'watchdog_tick': m.TICK_TYPE, 'configuration': m.CONFIGURATION_TYPE}
-_NAMES = {kind: topic for topic, kind in _LAST_PARTS.items()}
-"""message type -> last part of its topic"""
 _OWN = {m.ESTIMATE_TYPE: 'estimate', m.FEEDFORWARD_TYPE: 'feedforward', m.TICK_TYPE: 'tick'}
-"""message type that the node of a machine makes for each actuator -> field of `Topics`"""
+"""Message type that the node of a machine makes for each actuator -> field of `Topics`."""
+ANSWER_TOPICS = {m.ESTIMATE_TYPE: ESTIMATE_TOPIC, m.FEEDFORWARD_TYPE: FEEDFORWARD_TOPIC}
+"""Message type of an answer -> topic, if the bag has no topic of that type."""
+
+RECORDED = '_recorded'
+"""End of the name of the topic that keeps the feed-forward that acted, in a bag of ``seal_friction replay``."""
 
 
-class MappingFile(NamedTuple):
-    """A mapping file with the configurations of its actuators."""
+class Topics(NamedTuple):
+    """Names of the estimator's topics in a bag; empty if there is no such topic."""
 
-    name: str  # as given
-    file: MachineFile
-    configurations: dict[str, Configuration]
+    pressure: str
+    velocity: str
+    force: str
+    reference: str
+    position: str
+    estimate: str
+    feedforward: str
+    configuration: str
+    tick: str
+    temperature: str
+    clock: str
 
-    def only(self, actuator: str) -> 'MappingFile':
-        """The same machine with one of its actuators."""
-        document = self.file.document or {}
-        document = {**document, 'actuators': {actuator: document['actuators'][actuator]}}
-        return self._replace(file=parse_machine(document, self.name))
+    @property
+    def inputs(self) -> set[str]:
+        """Topics that the estimator takes."""
+        used = self.pressure, self.velocity, self.force, self.reference, self.tick, self.temperature, self.clock
+        return set(used) - {''}
 
+    @property
+    def answers(self) -> dict[str, str]:
+        """Message type of an answer -> its topic; empty if there is no such topic."""
+        return {m.ESTIMATE_TYPE: self.estimate, m.FEEDFORWARD_TYPE: self.feedforward}
 
-def read_mapping(name: str) -> MappingFile:
-    """Mapping file: a path, or the name of one in ``config/machines``.
-
-    Raises:
-        ValueError: It, or a seal file in it, cannot be read or is invalid; one line that names file and actuator.
-    """
-    file = read_machine(name)
-    return MappingFile(name, file, machine_configurations(file, name))
-
-
-def machine_in(bag: Path, mapping: MappingFile) -> tuple[Machine, MachineState]:
-    """Machine of a mapping file with the definitions in a bag, and its state before the first message.
-
-    Raises:
-        ValueError: The mapping does not fit the bag; one line that names file, actuator or topic.
-        BagError: The bag cannot be read.
-    """
-    known = {topic: info.type_name for topic, info in bag_topics(bag).items()}
-    for topic, kind in mapping.file.topics.items():
-        if topic in known and short_name(known[topic]) != kind:
-            raise ValueError(f'{mapping.name}: topics.{topic} is {kind}, but {bag} has {known[topic]} there')
-    if not any(topic in known for topic in mapping.file.topics):
-        raise ValueError(f'{bag}: none of the topics of {mapping.name}; it has {", ".join(sorted(known)) or "none"}')
-    machine = make_machine(mapping.file, mapping.configurations, read_definitions(bag, mapping.file.topics.values()))
-    offset = _clock_offset(machine, bag)
-    states = (one._replace(pipeline=one.pipeline._replace(clock_offset=offset)) for one in init(machine).actuators)
-    return machine, MachineState(tuple(states))
+    @property
+    def state(self) -> str:
+        """Topic of the states amid the bag, if there are any."""
+        return f'{(self.configuration or CONFIGURATION_TOPIC).rpartition("/")[0]}/{STATE_NAME}'
 
 
-def _clock_offset(machine: Machine, bag: Path) -> int:
-    """What the clock of the stamps shows after the log time [ns], by the first stamp; 0 if it is the same clock.
+TYPES = Topics(
+    pressure=m.PRESSURE_TYPE,
+    velocity=m.VELOCITY_TYPE,
+    force=m.FORCE_TYPE,
+    reference=m.REFERENCE_TYPE,
+    position=m.POSITION_TYPE,
+    estimate=m.ESTIMATE_TYPE,
+    feedforward=m.FEEDFORWARD_TYPE,
+    configuration=m.CONFIGURATION_TYPE,
+    tick=m.TICK_TYPE,
+    temperature=m.TEMPERATURE_TYPE,
+    clock=m.CLOCK_TYPE,
+)
+"""Message type of each topic."""
 
-    Stamps of a simulation begin near 0, log times are those of the day.
-    """
-    for message in read_messages(bag):
-        plan = machine.plans.get(message.topic)
-        stamp = plan.read(message.data).stamp if plan is not None else None
-        if stamp is not None:
-            offset = stamp - message.log_time
-            return offset if abs(offset) > LARGEST_CLOCK_STEP else 0
-    return 0
 
-
-def machine_messages(bag: Path, mapping: MappingFile | None, *, with_answers: bool = True) -> Iterator[BagMessage]:
-    """Messages of a bag; with a mapping file as ``machine_estimator`` would have recorded them.
-
-    What an estimator of this project may have recorded in it is left out then.
+def find_topics(bag: Path, namespace: str = '') -> Topics:
+    """The estimator's topics in a bag, found by message type, so that names and remapping do not matter.
 
     Args:
         bag: The bag.
-        mapping: Of its machine; None: the bag as it is.
-        with_answers: Whether to estimate, too.
+        namespace: Use only topics below it; for bags of several actuators.
 
     Raises:
-        ValueError: As of `machine_in`.
-        BagError: The bag cannot be read.
+        BagError: There is no velocity topic, or a type of this project has several topics.
     """
-    if mapping is None:
-        yield from read_messages(bag)
-        return
-    machine, state = machine_in(bag, mapping)
-    answers: list[tuple[str, str, bytes]] = []
-
-    def collect(name: str, record: m.Output, frame_id: bytes) -> None:
-        kind = m.type_of(record)
-        answers.append((f'/{name}/{_NAMES[kind]}', kind, m.encode(record, frame_id)))
-
-    text = m.encode_text(machine_text(snapshot_of(machine, state)))
-    for number, message in enumerate(read_messages(bag)):
-        if number == 0:
-            yield BagMessage(MACHINE_CONFIGURATION, m.CONFIGURATION_TYPE, message.log_time, text)
-        if message.topic in machine.plans:
-            yield message._replace(publish_time=message.log_time)  # it does not tell when it was sent
-            if with_answers:
-                plan = machine.plans[message.topic]
-                with named(bag, message):
-                    state = receive(machine, state, plan, plan.read(message.data), message.log_time, collect)
-                yield from (BagMessage(topic, kind, message.log_time, data) for topic, kind, data in answers)
-                answers.clear()
-        elif message.type_name not in (*m.DECODERS, MACHINE_TYPE):
-            yield message
+    return topics_among(bag_topics(bag), bag, namespace)
 
 
-class Translation:
-    """Records of this project in the messages of a machine, as its estimator makes them.
+def topics_among(infos: Mapping[str, TopicInfo], bag: Path, namespace: str = '') -> Topics:
+    """`find_topics` in a bag whose topics are known."""
+    result = Topics(*(find_topic(bag, wanted, namespace, infos) for wanted in TYPES))
+    if not result.velocity:
+        raise BagError(
+            f'{bag}: no message of {TYPES.velocity} in it, so nothing to estimate from: a bag of another machine needs '
+            'its mapping file (--mapping, or seal_friction import bag)'
+        )
+    return result
 
-    Args:
-        machine: The machine.
-        state: Its state; only clocks and what the newest messages held count.
-        only: Actuator whose records are made; empty: all of them.
+
+def find_topic(bag: Path, wanted: str, namespace: str, known: Mapping[str, TopicInfo]) -> str:
+    """The topic of a message type, see `find_topics`; empty if there is none.
+
+    Raises:
+        BagError: A type of this project has several topics.
     """
-
-    def __init__(self, machine: Machine, state: MachineState, only: str = '') -> None:
-        self._actuators, self._states = machine.actuators, list(state.actuators)
-        self._plans = {
-            topic: plan._replace(taken=tuple(one for one in plan.taken if only in ('', machine.actuators[one[0]].name)))
-            for topic, plan in machine.plans.items()
-        }
-
-    @property
-    def topics(self) -> Collection[str]:
-        """Topics of the machine."""
-        return self._plans.keys()
-
-    def records(self, message: BagMessage, missing: Counter[str]) -> Iterator[tuple[int, m.Input, bytes]]:
-        """Number of the actuator, record and frame name of what a message makes, in the order of the estimator.
-
-        Args:
-            message: On one of the topics.
-            missing: Counts what messages lacked.
-
-        Raises:
-            ValueError: The message does not match its type.
-        """
-        plan, received = self._plans[message.topic], message.log_time
-        if not plan.taken:
-            return
-        try:
-            reading = plan.read(message.data)
-        except ValueError as error:  # as the node: it counts the message as malformed and goes on
-            missing[f'{message.topic}: {error}'] += 1
-            return
-        missing.update(f'{message.topic}: {text}' for text in reading.missing)
-        for number, taken in plan.taken:
-            actuator, known = self._actuators[number], self._states[number]
-            stamp = reading.stamp
-            if stamp is None:
-                stamp = stamp_of(actuator, known.pipeline, received, message.publish_time)
-            try:
-                memory, made = records_of(actuator, known.memory, taken, reading.numbers, stamp, reading.frame_id)
-            except (ArithmeticError, ValueError):
-                continue  # as the node: the actuator does not take the message
-            self._states[number] = known._replace(memory=memory)
-            yield from ((number, record, reading.frame_id) for record in made)
-
-    def follow(self, clock: Clock, received: int) -> None:
-        """Follow simulated time."""
-        offset = clock.stamp - received
-        self._states = [known._replace(pipeline=known.pipeline._replace(clock_offset=offset)) for known in self._states]
+    below = f'/{namespace.strip("/")}/'.replace('//', '/')
+    found = [
+        topic
+        for topic, info in sorted(known.items())
+        if info.type_name == wanted and info.message_count and not topic.endswith(RECORDED)
+        if topic.startswith(below) or wanted == TYPES.clock  # simulated time is one for all
+    ]
+    if len(found) > 1 and wanted == TYPES.temperature:  # a standard type: others may be of a motor or a battery
+        found = [topic for topic in found if topic.endswith(TEMPERATURE_TOPIC)]
+    if len(found) > 1:
+        raise BagError(f'{bag}: several topics of {wanted}: {", ".join(found)}: choose with --namespace')
+    return found[0] if found else ''
 
 
 class ActuatorBag(NamedTuple):
@@ -252,20 +184,18 @@ class ActuatorBag(NamedTuple):
             return read_messages(self.path)
         return _OfActuator(self).messages(machine_messages(self.path, self.mapping, with_answers=with_answers))
 
-    def blocks(self, kind_of: KindOf, *, in_bulk: bool = True, with_answers: bool = False) -> Iterator[Messages]:
-        """Messages in blocks.
+    def blocks(self, kind_of: KindOf) -> Iterator[Messages]:
+        """Messages in blocks; loads the compiler, which reads bags of this project many times faster.
 
         Args:
             kind_of: Kind of the messages on a topic.
-            in_bulk: Whether to load the compiler, which reads bags of this project many times faster.
-            with_answers: As of `messages`.
 
         Raises:
             UnsuitedError: As of `block_reader.read_in_bulk`.
             BagError: The bag cannot be read.
         """
-        if self.actuator or not in_bulk:
-            return gathered(self.messages(with_answers=with_answers), kind_of)
+        if self.actuator:
+            return gathered(self.messages(), kind_of)
         from seal_friction_ros.offline.bags.block_reader import read_in_bulk  # noqa: PLC0415  loads the compiler
 
         return read_in_bulk(self.path, kind_of)
@@ -284,52 +214,66 @@ def open_actuator(bag: Path, namespace: str = '', mapping: MappingFile | None = 
         ValueError: The mapping does not fit the bag.
     """
     infos = bag_topics(bag)
-    if not is_of_machine(bag, infos, mapping):
-        return ActuatorBag(bag, find_topics(bag, namespace, infos), infos)
-    if mapping is not None:
+    if mapping is not None and is_for(mapping, infos):
         names = [one.name for one in mapping.file.actuators]
         mapping = mapping.only(_chosen(bag, names, namespace))
         machine, _ = machine_in(bag, mapping)
-    else:
-        machine, _ = _machine_of(bag, _first_snapshot(bag))
-        names = [one.name for one in machine.actuators]
-    name = _chosen(bag, names, namespace)
-    actuator = next(one for one in machine.actuators if one.name == name)
+        return _opened(machine.actuators[0], bag, infos, len(names), mapping)
+    snapshot = recorded_machine(bag, infos) if mapping is None else None
+    if snapshot is not None:
+        return actuator_of(bag, infos, snapshot, namespace)
+    return ActuatorBag(bag, topics_among(infos, bag, namespace), infos)
+
+
+def actuator_of(bag: Path, infos: Mapping[str, TopicInfo], snapshot: MachineSnapshot, namespace: str) -> ActuatorBag:
+    """An actuator of a bag of ``machine_estimator``; arguments and errors as of `open_actuator`."""
+    machine, _ = _machine_of(bag, snapshot)
+    actuators = {one.name: one for one in machine.actuators}
+    return _opened(actuators[_chosen(bag, [*actuators], namespace)], bag, infos, len(actuators))
+
+
+def _opened(
+    actuator: MachineActuator,
+    bag: Path,
+    infos: Mapping[str, TopicInfo],
+    count: int,
+    mapping: MappingFile | None = None,
+) -> ActuatorBag:
+    """One of ``count`` actuators."""
     topics = _topics_of(actuator, infos, has_mapping=mapping is not None)
     if not topics.velocity:
-        raise BagError(no_velocity(bag, name))
-    return ActuatorBag(bag, topics, infos, name, len(names) > 1, mapping)
+        raise BagError(no_velocity(bag, actuator.name))
+    return ActuatorBag(bag, topics, infos, actuator.name, count > 1, mapping)
 
 
-def is_of_machine(bag: Path, infos: Mapping[str, TopicInfo], mapping: MappingFile | None) -> bool:
-    """Whether a bag is read by a mapping, its own or that of the file.
-
-    A mapping file is for other bags if this one has none of its topics, but velocities of this project.
-
-    Args:
-        bag: The bag.
-        infos: Its topics.
-        mapping: Mapping file.
+def recorded_machine(bag: Path, infos: Mapping[str, TopicInfo]) -> MachineSnapshot | None:
+    """Machine whose ``machine_estimator`` recorded a bag; None: another bag.
 
     Raises:
         BagError: The bag, or its configuration, cannot be read.
     """
     present = {info.type_name for info in infos.values() if info.message_count}
-    if mapping is not None:
-        return m.VELOCITY_TYPE not in present or not infos.keys().isdisjoint(mapping.file.topics)
     if m.CONFIGURATION_TYPE not in present:
-        return False
+        return None
     try:
-        return _first_snapshot(bag).file.document is not None
+        first = first_snapshot(bag, read_messages(bag))
     except BagError:
         if m.VELOCITY_TYPE in present:  # a bag with a configuration that cannot be read is still worth a report
-            return False
+            return None
         raise
+    return None if first is None or first.file.document is None else first
 
 
-def _first_snapshot(bag: Path) -> MachineSnapshot:
-    """Snapshot in the first configuration of a bag."""
-    first = next(message for message in read_messages(bag) if message.type_name == m.CONFIGURATION_TYPE)
+def first_snapshot(bag: Path, messages: Iterable[BagMessage], topic: str = '') -> MachineSnapshot | None:
+    """Snapshot in the first configuration, on a topic if one is given; None without one.
+
+    Raises:
+        BagError: It cannot be read.
+    """
+    found = (one for one in messages if one.type_name == m.CONFIGURATION_TYPE and topic in ('', one.topic))
+    first = next(found, None)
+    if first is None:
+        return None
     with named(bag, first):
         return parse_machine_text(m.decode_text(first.data))
 
@@ -380,7 +324,7 @@ def _topics_of(actuator: MachineActuator, infos: Mapping[str, TopicInfo], *, has
     if not has_mapping:
         made |= {_OWN[kind] for topic, kind in present.items() if kind in _OWN and _is_of(actuator.name, topic)}
     names = {
-        name: f'/{actuator.name}/{_NAMES[kind]}' if name in made else ''
+        name: f'/{actuator.name}/{LAST_PART[kind]}' if name in made else ''
         for name, kind in zip(TYPES._fields, TYPES, strict=True)
     }
     clocks = [topic for topic, kind in present.items() if kind == m.CLOCK_TYPE and not has_mapping]
@@ -457,13 +401,8 @@ class _OfActuator:
         for record, frame_id in made:
             kind = m.type_of(record)
             self._has_velocity |= kind == m.VELOCITY_TYPE
-            topic = f'/{self._name}/{_NAMES[kind]}'
+            topic = f'/{self._name}/{LAST_PART[kind]}'
             yield message._replace(topic=topic, type_name=kind, data=m.encode(record, frame_id))
-
-
-def lacking(missing: Mapping[str, int]) -> list[str]:
-    """What messages lacked, in words."""
-    return [f'{text} ({count} messages)' for text, count in missing.items()]
 
 
 def no_velocity(bag: Path, actuator: str, reasons: Sequence[str] = ()) -> str:
@@ -472,12 +411,41 @@ def no_velocity(bag: Path, actuator: str, reasons: Sequence[str] = ()) -> str:
     return f'{bag}: {actuator}: no velocity in it, so nothing to estimate from: {said}'
 
 
-@contextmanager
-def named(bag: Path, message: BagMessage) -> Iterator[None]:
-    """Convert the error of a message to one that names it."""
-    try:
-        yield
-    except BagError:
-        raise
-    except ValueError as error:
-        raise BagError(f'{bag}: message on {message.topic} at {message.log_time} ns: {error}') from None
+# -- to replay --------------------------------------------------------------------------------------------------------
+
+
+class Source(NamedTuple):
+    """Messages of a bag that are replayed: all of them, or those of one actuator."""
+
+    path: Path
+    infos: Mapping[str, TopicInfo]
+    read: Callable[[], Iterator[BagMessage]]
+    configuration: str  # topic; empty if there is none
+    first: MachineSnapshot | None  # in the first configuration
+    own: Topics | None  # of the built-in mapping; None: the machine has a mapping file
+
+
+def source_of(bag: Path | ActuatorBag, namespace: str) -> Source:
+    """Messages to replay.
+
+    Args:
+        bag: The bag, or one actuator of it.
+        namespace: Use only topics below it; the name of an actuator of a machine: that actuator alone.
+
+    Raises:
+        BagError: The bag cannot be read, or has not what the estimator needs.
+    """
+    infos: Mapping[str, TopicInfo]
+    read: Callable[[], Iterator[BagMessage]]
+    if isinstance(bag, Path):
+        path, infos, read = bag, bag_topics(bag), partial(read_messages, bag)
+        configuration = find_topic(bag, m.CONFIGURATION_TYPE, namespace, infos)
+        machine = recorded_machine(bag, infos) if namespace and not configuration else None
+        if machine is not None:
+            return source_of(actuator_of(bag, infos, machine, namespace), '')
+    else:
+        path, infos, read, configuration = bag.path, bag.used, bag.messages, bag.topics.configuration
+    first = first_snapshot(path, read(), configuration) if configuration else None
+    is_own = first is None or first.file.document is None
+    own = topics_among(infos, path, namespace) if is_own else None
+    return Source(path, infos, read, configuration, first, own)

@@ -6,25 +6,28 @@ memory is bounded, and no file outside the bag is opened.
 """
 
 import errno
-import json
 import os
 import re
 import shutil
 import sqlite3
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from datetime import UTC, datetime
 from functools import cache
-from importlib.util import find_spec
+from itertools import islice
 from pathlib import Path, PurePosixPath
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
+import numpy as np
 import yaml
 
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, PACKAGE
-from seal_friction_ros.files import parse_yaml, read_yaml, share_directory
+from seal_friction_ros.core.estimation.message_blocks import MOST_MESSAGES, Messages
+from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS
+from seal_friction_ros.core.machine.message_fields import Definition, full_name, parse_definition, short_name
+from seal_friction_ros.files import parse_yaml, read_yaml
 from seal_friction_ros.offline.bags import mcap_reader, sqlite_reader
+from seal_friction_ros.offline.bags.definitions import known_definition, message_definition
 from seal_friction_ros.offline.bags.mcap_reader import Channel
 from seal_friction_ros.offline.bags.mcap_writer import FILE_MODE, Contents, Description, McapOutput
 
@@ -57,66 +60,38 @@ class BagError(ValueError):
     """A bag that cannot be read or written; one line that says which and why."""
 
 
+def message_error(bag: Path, message: BagMessage, error: ValueError) -> BagError:
+    """Error of a message, with its name."""
+    return BagError(f'{bag}: message on {message.topic} at {message.log_time} ns: {error}')
+
+
+@contextmanager
+def named(bag: Path, message: BagMessage) -> Iterator[None]:
+    """Convert the error of a message to one that names it."""
+    try:
+        yield
+    except BagError:
+        raise
+    except ValueError as error:
+        raise message_error(bag, message, error) from None
+
+
 def timed_name(name: str) -> str:
     """``name`` with the present time (UTC) at its end, in the place of another time there."""
     return f'{START_IN_NAME.sub("", name)}_{datetime.now(UTC):%Y%m%d_%H%M%S_%f}'
 
 
 @cache
-def message_definition(type_name: str) -> tuple[str, str]:
-    """Full text of the definition of an installed message type, and its RIHS01 hash.
-
-    The text of a message of this project has its comments, with the units.
+def describe(type_name: str) -> Description:
+    """Description of a topic whose type is installed.
 
     Raises:
-        BagError: The type is not installed.
+        BagError: It is not.
     """
     try:
-        description = json.loads(_definition_file(type_name, '.json').read_text())
-        hashes = {entry['type_name']: entry['hash_string'] for entry in description['type_hashes']}
-        described = description['type_description_msg']
-        fields = {part['type_name']: part['fields'] for part in described['referenced_type_descriptions']}
-        used: list[str] = []
-        _collect(described['type_description']['fields'], fields, used)
-        parts = [_definition_text(type_name)]
-        for name in used:
-            package, _, stem = name.split('/')
-            parts.append(f'MSG: {package}/{stem}\n{_definition_text(name)}')
-    except (OSError, ValueError, LookupError) as error:
-        raise BagError(
-            f'{type_name} is not installed: run make setup, or source the colcon workspace: {error}'
-        ) from None
-    return ('=' * 80 + '\n').join(parts), hashes[type_name]
-
-
-def _collect(fields: Any, known: Mapping[str, Any], used: list[str]) -> None:
-    """Append the types of fields, and those of their fields, in order."""
-    for name in (field['type']['nested_type_name'] for field in fields):
-        if name and name not in used:
-            used.append(name)
-            _collect(known[name], known, used)
-
-
-def _definition_text(type_name: str) -> str:
-    text = _definition_file(type_name, '.msg').read_text()
-    if type_name.startswith(PACKAGE):
-        return text
-    lines = (line.partition('#')[0].rstrip() for line in text.splitlines())
-    return ''.join(f'{line}\n' for line in lines if line)
-
-
-def _definition_file(type_name: str, suffix: str) -> Path:
-    package, _, name = type_name.split('/')
-    spec = find_spec(package)
-    if spec is None or spec.origin is None:
-        raise ValueError(f'no package {package}')
-    return share_directory(package, spec.origin) / 'msg' / f'{name}{suffix}'
-
-
-@cache
-def describe(type_name: str) -> Description:
-    """Description of a topic whose type is installed."""
-    definition, type_hash = message_definition(type_name)
+        definition, type_hash = message_definition(type_name)
+    except ValueError as error:
+        raise BagError(str(error)) from None
     metadata = {'offered_qos_profiles': _yaml_text([_qos(type_name)]), 'topic_type_hash': type_hash}
     return Description(type_name, 'ros2msg', definition.encode(), metadata)
 
@@ -420,6 +395,22 @@ def read_messages(path: Path) -> Iterator[BagMessage]:
                 yield message
 
 
+KindOf = Callable[[str, str], int]
+"""Topic and message type -> kind of its messages, for example a `Kind`; below 255."""
+
+
+def gathered(messages: Iterable[BagMessage], kind_of: KindOf) -> Iterator[Messages]:
+    """Messages of `read_messages` in blocks."""
+    source = iter(messages)
+    while block := list(islice(source, MOST_MESSAGES // 4)):
+        kinds = np.array([kind_of(message.topic, message.type_name) for message in block], np.uint8)
+        sizes = np.array([len(message.data) for message in block], np.int64)
+        data = np.frombuffer(b''.join(message.data for message in block), np.uint8)
+        times = np.array([message.log_time for message in block], np.int64)
+        sent = [message.log_time if message.publish_time is None else message.publish_time for message in block]
+        yield Messages(data, kinds, np.cumsum(sizes) - sizes, sizes, times, np.array(sent, np.int64))
+
+
 class Storage(NamedTuple):
     """Files of a bag and how to read them."""
 
@@ -474,6 +465,35 @@ def bag_topics(path: Path) -> dict[str, TopicInfo]:
         if before.type_name != type_name:
             raise BagError(f'{path}: {topic} has messages of {before.type_name} and of {type_name}')
         found[topic] = TopicInfo(type_name, count + before.message_count)
+    return found
+
+
+def read_definitions(path: Path, types: Iterable[str]) -> dict[str, Definition]:
+    """Definition of each type (``package/Name``), of the bag if it has one.
+
+    A bag holds them as MCAP schemas or in the table ``message_definitions`` of SQLite, which rosbag2 writes since Iron.
+
+    Args:
+        path: Bag folder, or a bare MCAP or SQLite file.
+        types: The types that are needed.
+
+    Raises:
+        BagError: The bag cannot be read, or a type is neither defined in it nor installed, nor one of ROS 2.
+    """
+    wanted = dict.fromkeys(short_name(name) for name in types)
+    texts: dict[str, str] = {}
+    for channel, _ in bag_channels(path):
+        type_name, encoding, definition, _ = channel.description
+        if encoding == 'ros2msg' and definition:
+            texts.setdefault(short_name(type_name), definition.decode(errors='replace'))
+        if wanted.keys() <= texts.keys():
+            break
+    found = {}
+    for name in wanted:
+        try:
+            found[name] = parse_definition(name, texts.get(name) or known_definition(full_name(name)))
+        except ValueError as error:
+            raise BagError(f'{path}: definition of {name}: {error}') from None
     return found
 
 

@@ -16,8 +16,7 @@ from mcap.opcode import Opcode
 from seal_friction_ros.core.estimation.message_blocks import MOST_MESSAGES, Bytes, Integers, Messages
 from seal_friction_ros.core.foundation.compiled import compiled
 from seal_friction_ros.offline.bags import mcap_reader
-from seal_friction_ros.offline.bags.bag import read_messages, storage
-from seal_friction_ros.offline.bags.gathered import KindOf, gathered
+from seal_friction_ros.offline.bags.bag import KindOf, gathered, read_messages, storage
 from seal_friction_ros.offline.bags.mcap_reader import HEAD, LAST_TIME, MESSAGE_HEAD, Block, Layout, Names
 
 

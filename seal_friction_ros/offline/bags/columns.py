@@ -18,10 +18,9 @@ from seal_friction_ros.core.estimation.messages import LAYOUTS, LONGEST_FRAME, S
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.foundation.compiled import has_compiler
 from seal_friction_ros.core.friction.states import FrictionState
-from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag
-from seal_friction_ros.offline.bags.bag import BagError
+from seal_friction_ros.offline.bags.actuator_bag import TYPES, ActuatorBag
+from seal_friction_ros.offline.bags.bag import BagError, BagMessage, gathered
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS
-from seal_friction_ros.offline.bags.topics import TYPES
 from seal_friction_ros.offline.work.progress import progress
 
 BULK_FROM = 300_000
@@ -30,6 +29,9 @@ BULK_FROM = 300_000
 _LAYOUTS = {layout.message_type: layout for layout in LAYOUTS}
 _DTYPES: dict[str, np.dtype[Any]] = dict(zip('dIBb', map(np.dtype, ('<f8', '<u4', 'u1', 'i1')), strict=True))
 _HEAD = 16  # [bytes] encapsulation, stamp, length of the frame name
+
+
+_Decoded = TypeVar('_Decoded')
 
 
 class Wanted(NamedTuple):
@@ -69,8 +71,8 @@ class Block:
         topic, type_name = self._wanted[name]
         return numbers_of(self.messages, self._kinds[name], type_name, topic)
 
-    def texts(self, name: str) -> Iterator[tuple[int, int, str]]:
-        """Place, log time [ns] and text of each message of a name.
+    def decoded(self, name: str, decode: Callable[[bytes], _Decoded]) -> Iterator[tuple[int, int, _Decoded]]:
+        """Place, log time [ns] and contents of each message of a name.
 
         Raises:
             ValueError: One is malformed; names its topic and time.
@@ -78,10 +80,10 @@ class Block:
         for place in np.flatnonzero(self.messages.kinds == self._kinds[name]).tolist():
             time = int(self.messages.received[place])
             try:
-                text = decode_text(self.messages.message(place))
+                contents = decode(self.messages.message(place))
             except ValueError as error:
                 raise ValueError(f'message on {self._wanted[name].topic} at {time} ns: {error}') from None
-            yield place, time, text
+            yield place, time, contents
 
 
 class Collector(Protocol):
@@ -99,7 +101,7 @@ def collected(
     wanted: Mapping[str, Wanted],
     make: Callable[[], _Collector],
     *,
-    with_answers: bool = False,
+    messages: Iterable[BagMessage] | None = None,
     bulk_from: int = BULK_FROM,
 ) -> _Collector:
     """A new collector with all blocks of a bag.
@@ -108,7 +110,7 @@ def collected(
         bag: The bag.
         wanted: Name -> topic and type of the messages that the collector takes.
         make: Makes an empty collector; an unusual bag takes a second one.
-        with_answers: As of `ActuatorBag.messages`.
+        messages: Instead of those of the bag.
         bulk_from: Smallest number of messages to read in bulk.
 
     Raises:
@@ -131,11 +133,11 @@ def collected(
                 advance(len(block.kinds))
         return collector
 
-    if not bag.actuator and bag.total >= bulk_from and has_compiler():
+    if messages is None and not bag.actuator and bag.total >= bulk_from and has_compiler():
         with suppress(UnsuitedError, OSError, *ERRORS):  # the general reader reads it, or says what is wrong
             return fill(bag.blocks(kind_of))
     try:
-        return fill(bag.blocks(kind_of, in_bulk=False, with_answers=with_answers))
+        return fill(gathered(bag.messages() if messages is None else messages, kind_of))
     except BagError:
         raise
     except (UnsuitedError, ValueError) as error:
@@ -248,7 +250,7 @@ class _VelocityCollector:
 
     def add(self, block: Block) -> None:
         """Take one block."""
-        for _, _, text in block.texts('configuration'):
+        for _, _, text in block.decoded('configuration', decode_text):
             self._configuration = parse_snapshot(text).configuration
         found = {name: block.of(name) for name in INPUTS}
         self._stamps.frombytes(found['velocity'].stamps.tobytes())

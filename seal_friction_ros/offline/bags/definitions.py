@@ -1,49 +1,77 @@
-"""Definitions of message types: from the bag itself, else an installed package, else those of ROS 2 in ``rosbags``."""
+"""Definitions of message types outside of bags: of an installed package, else those of ROS 2 in ``rosbags``."""
 
-from collections.abc import Iterable
+import json
+from collections.abc import Mapping
+from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
-from seal_friction_ros.core.machine.message_fields import Definition, full_name, parse_definition, short_name
-from seal_friction_ros.offline.bags.bag import BagError, bag_channels, message_definition
+from seal_friction_ros.core.estimation.messages import PACKAGE
+from seal_friction_ros.files import share_directory
 from seal_friction_ros.packages import needed
 
-ROS2MSG = 'ros2msg'
 
+@cache
+def message_definition(type_name: str) -> tuple[str, str]:
+    """Full text of the definition of an installed message type, and its RIHS01 hash.
 
-def read_definitions(bag: Path, types: Iterable[str]) -> dict[str, Definition]:
-    """Definition of each type (``package/Name``).
-
-    A bag holds them as MCAP schemas or in the table ``message_definitions`` of SQLite, which rosbag2 writes since Iron.
-
-    Args:
-        bag: Bag folder, or a bare MCAP or SQLite file.
-        types: The types that are needed.
+    The text of a message of this project has its comments, with the units.
 
     Raises:
-        BagError: The bag cannot be read, or a type is neither defined in it nor installed, nor one of ROS 2.
+        ValueError: The type is not installed.
     """
-    wanted = dict.fromkeys(short_name(name) for name in types)
-    texts: dict[str, str] = {}
-    for channel, _ in bag_channels(bag):
-        type_name, encoding, definition, _ = channel.description
-        if encoding == ROS2MSG and definition:
-            texts.setdefault(short_name(type_name), definition.decode(errors='replace'))
-        if wanted.keys() <= texts.keys():
-            break
-    found = {}
-    for name in wanted:
-        try:
-            found[name] = parse_definition(name, texts[name] if name in texts else _known_text(full_name(name)))
-        except ValueError as error:
-            raise BagError(f'{bag}: definition of {name}: {error}') from None
-    return found
+    try:
+        description = json.loads(_definition_file(type_name, '.json').read_text())
+        hashes = {entry['type_name']: entry['hash_string'] for entry in description['type_hashes']}
+        described = description['type_description_msg']
+        fields = {part['type_name']: part['fields'] for part in described['referenced_type_descriptions']}
+        used: list[str] = []
+        _collect(described['type_description']['fields'], fields, used)
+        parts = [_definition_text(type_name)]
+        for name in used:
+            package, _, stem = name.split('/')
+            parts.append(f'MSG: {package}/{stem}\n{_definition_text(name)}')
+    except (OSError, ValueError, LookupError) as error:
+        raise ValueError(
+            f'{type_name} is not installed: run make setup, or source the colcon workspace: {error}'
+        ) from None
+    return ('=' * 80 + '\n').join(parts), hashes[type_name]
 
 
-def _known_text(type_name: str) -> str:
-    """Definition of an installed type, or of one that is installed elsewhere: an older bag of SQLite has none."""
+def _collect(fields: Any, known: Mapping[str, Any], used: list[str]) -> None:
+    """Append the types of fields, and those of their fields, in order."""
+    for name in (field['type']['nested_type_name'] for field in fields):
+        if name and name not in used:
+            used.append(name)
+            _collect(known[name], known, used)
+
+
+def _definition_text(type_name: str) -> str:
+    text = _definition_file(type_name, '.msg').read_text()
+    if type_name.startswith(PACKAGE):
+        return text
+    lines = (line.partition('#')[0].rstrip() for line in text.splitlines())
+    return ''.join(f'{line}\n' for line in lines if line)
+
+
+def _definition_file(type_name: str, suffix: str) -> Path:
+    package, _, name = type_name.split('/')
+    spec = find_spec(package)
+    if spec is None or spec.origin is None:
+        raise ValueError(f'no package {package}')
+    return share_directory(package, spec.origin) / 'msg' / f'{name}{suffix}'
+
+
+def known_definition(type_name: str) -> str:
+    """Definition of an installed type, or of one that is installed elsewhere: an older bag of SQLite has none.
+
+    Raises:
+        ValueError: It is neither.
+    """
     try:
         return message_definition(type_name)[0]
-    except BagError:
+    except ValueError:
         typesys = needed('rosbags.typesys')
         try:
             return str(typesys.get_typestore(typesys.Stores.LATEST).generate_msgdef(type_name, ros_version=2)[0])

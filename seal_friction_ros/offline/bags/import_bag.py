@@ -29,16 +29,7 @@ from seal_friction_ros.core.estimation.records import Position, Pressure, ServoR
 from seal_friction_ros.core.foundation.stamps import StampRepair
 from seal_friction_ros.core.machine.gauge_or_absolute import Lowest, pressure_remarks
 from seal_friction_ros.core.machine.machine import Machine, MachineActuator, MachineState
-from seal_friction_ros.offline.bags.actuator_bag import (
-    MappingFile,
-    Translation,
-    lacking,
-    machine_in,
-    named,
-    no_velocity,
-    read_mapping,
-    sources_of,
-)
+from seal_friction_ros.offline.bags.actuator_bag import no_velocity, sources_of
 from seal_friction_ros.offline.bags.bag import (
     CONFIGURATION_TOPIC,
     BagError,
@@ -46,8 +37,10 @@ from seal_friction_ros.offline.bags.bag import (
     BagWriter,
     TopicInfo,
     bag_topics,
+    named,
     read_messages,
 )
+from seal_friction_ros.offline.bags.mapped_bag import MappingFile, Translation, lacking, machine_in, read_mapping
 from seal_friction_ros.offline.work.progress import progress
 
 _TOPICS = {type_name: f'/{topic}' for topic, type_name in INPUTS.items()}

@@ -12,9 +12,8 @@ from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, decode_together
 from seal_friction_ros.core.machine.machine_snapshot import parse_machine_text
 from seal_friction_ros.core.machine.message_fields import Reader, short_name
-from seal_friction_ros.offline.bags.actuator_bag import MappingFile, machine_messages, named
-from seal_friction_ros.offline.bags.bag import BagError, BagMessage, bag_topics
-from seal_friction_ros.offline.bags.definitions import read_definitions
+from seal_friction_ros.offline.bags.bag import BagError, BagMessage, bag_topics, named, read_definitions
+from seal_friction_ros.offline.bags.mapped_bag import MappingFile, machine_messages
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,7 @@ from seal_friction_ros.core.machine.message_fields import (
     number_paths,
     short_name,
 )
-from seal_friction_ros.offline.bags.bag import BagError, bag_topics, read_messages
-from seal_friction_ros.offline.bags.definitions import read_definitions
+from seal_friction_ros.offline.bags.bag import BagError, bag_topics, read_definitions, read_messages
 from seal_friction_ros.offline.work.targets import mark
 
 MOST_MESSAGES = 5000  # of a topic that are looked at

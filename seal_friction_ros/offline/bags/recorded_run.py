@@ -13,14 +13,14 @@ import numpy as np
 
 from seal_friction_ros.core.estimation.configuration import parse_snapshot
 from seal_friction_ros.core.estimation.message_blocks import Messages
-from seal_friction_ros.core.estimation.messages import FEEDFORWARD_TYPE
+from seal_friction_ros.core.estimation.messages import FEEDFORWARD_TYPE, decode_text
 from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.documents import NotJsonError, parse_json
 from seal_friction_ros.core.friction.actuator import MountedSeal
 from seal_friction_ros.core.friction.force_sum_correction import corrected_force_sum, one_correction
 from seal_friction_ros.core.friction.mounting import pressures_at_seals
-from seal_friction_ros.offline.bags.actuator_bag import MappingFile, open_actuator
+from seal_friction_ros.offline.bags.actuator_bag import RECORDED, ActuatorBag, open_actuator
 from seal_friction_ros.offline.bags.bag import BagError
 from seal_friction_ros.offline.bags.columns import (
     Block,
@@ -33,7 +33,7 @@ from seal_friction_ros.offline.bags.columns import (
     in_turn,
     wanted_of,
 )
-from seal_friction_ros.offline.bags.topics import RECORDED
+from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 
 MAX_GAP = 0.5  # [s] samples further apart do not belong to one stretch of a recording (our choice)
 LARGEST_INPUT = 1e15  # [SI] above any real pressure, force or speed; the comparison also drops NaN and infinity
@@ -100,19 +100,22 @@ def read_run(bag: Path, namespace: str = '', mapping: MappingFile | None = None)
         BagError: The bag cannot be read, or holds no estimates.
     """
     source = open_actuator(bag, namespace, mapping)
-    topics = source.topics
-    if not topics.estimate:
+    if not source.topics.estimate:
         raise BagError(f'{bag}: no estimates in it: add them with seal_friction replay {bag} --out BAG')
-    wanted = wanted_of(source, (*_INPUTS, 'estimate', 'feedforward', 'configuration'))
-    wanted['acted'] = Wanted(topics.feedforward + RECORDED, FEEDFORWARD_TYPE)
-    collector = collected(source, wanted, _RunCollector, with_answers=True)
+    messages = source.messages(with_answers=True) if source.mapping is not None else None
+    collector = collected(source, wanted_of_run(source), RunCollector, messages=messages)
     if not collector.stamps:
         raise BagError(f'{bag}: the index lists estimates, but the bag holds none')
-    counts = {topic: (info.type_name, info.message_count) for topic, info in source.infos.items()}
-    return collector.run(source.name, counts)
+    return collector.run(source)
 
 
-class _RunCollector:
+def wanted_of_run(source: ActuatorBag) -> dict[str, Wanted]:
+    """Topics and types of what a `RunCollector` takes."""
+    wanted = wanted_of(source, (*_INPUTS, 'estimate', 'feedforward', 'configuration'))
+    return {**wanted, 'acted': Wanted(source.topics.feedforward + RECORDED, FEEDFORWARD_TYPE)}
+
+
+class RunCollector:
     """Keeps one row per estimate."""
 
     def __init__(self) -> None:
@@ -130,7 +133,7 @@ class _RunCollector:
         """Take one block."""
         found = {name: block.of(name) for name in _INPUTS}
         estimates = block.of('estimate')
-        for place, log_time, text in block.texts('configuration'):
+        for place, log_time, text in block.decoded('configuration', decode_text):
             with suppress(NotJsonError):  # such a text is shown as it is
                 parse_json(text, 'configuration')
             before = len(self.stamps) + int(np.searchsorted(estimates.places, place))
@@ -185,7 +188,7 @@ class _RunCollector:
             offsets = offsets[inside]
             offsets = offsets[(messages.data[offsets[:, np.newaxis] + 12 + np.arange(4 + length)] != name).any(axis=1)]
 
-    def run(self, name: str, counts: dict[str, tuple[str, int]]) -> RecordedRun:
+    def run(self, source: ActuatorBag) -> RecordedRun:
         """Arrays of all messages so far; an input that cannot be a measurement becomes NaN."""
         stamps = np.frombuffer(self.stamps, dtype=np.int64)
         columns = [np.frombuffer(column, dtype=np.float64) for column in self._columns]
@@ -205,8 +208,8 @@ class _RunCollector:
         # A configuration has no stamp: the time at which it was recorded counts.
         changes = tuple((round((t - start) * 1e-9, 6), text) for t, _, text in self._configurations)
         return RecordedRun(
-            name=name,
-            topics=counts,
+            name=source.name,
+            topics={topic: (info.type_name, info.message_count) for topic, info in source.infos.items()},
             frames=tuple(frame.decode(errors='replace') for frame in self._frames),
             configurations=changes,
             configuration_rows=tuple(row for _, row, _ in self._configurations),

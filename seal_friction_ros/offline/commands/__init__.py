@@ -1,1 +1,1 @@
-"""The command line ``seal_friction``: one file per command, with ``add_parser(commands)`` and ``run(arguments)``."""
+"""The command line ``seal_friction``: one file per subject, with ``add_parser(commands)`` and runs."""

@@ -5,7 +5,7 @@ import dataclasses
 import json
 import math
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -16,7 +16,7 @@ from seal_friction_ros.offline.work.targets import PAGE, Kind, checked_targets
 from seal_friction_ros.packages import needed
 
 if TYPE_CHECKING:
-    from seal_friction_ros.offline.bags.actuator_bag import MappingFile
+    from seal_friction_ros.offline.bags.mapped_bag import MappingFile
     from seal_friction_ros.offline.work.executor import Workers
     from seal_friction_ros.offline.work.finished_parts import Kept
     from seal_friction_ros.offline.work.places import Place
@@ -109,6 +109,16 @@ def _help(description: str, examples: Sequence[str]) -> dict[str, Any]:
     return {**shown, 'formatter_class': argparse.RawDescriptionHelpFormatter}
 
 
+Settings = dict[str, Any]
+"""Of an option, as of `argparse`."""
+
+
+def add_options(parser: Any, table: Mapping[str, tuple[str, Settings]]) -> None:
+    """Add options: name -> text for ``--help`` and settings."""
+    for name, (text, settings) in table.items():
+        parser.add_argument(name, help=text, **settings)
+
+
 def add_file(parser: Any, option: str, folder: str, what: str, **options: Any) -> None:
     """Add an argument for a file of ``config/FOLDER``: a path, or the name of one there, which the shell completes."""
     text = f'{what}: a path, or the name of one in config/{folder}'
@@ -141,15 +151,27 @@ def add_page(parser: argparse.ArgumentParser, option: str = '--out', *, required
     add_target(parser, option, PAGE, required=required, metavar='FILE.html', help=text)
 
 
+def add_actuator(parser: Any) -> None:
+    """Add the options that restrict a bag to one actuator, and for bags that tell nothing of their machine."""
+    add_namespace(parser)
+    add_mapping(parser)
+
+
 def add_namespace(parser: Any) -> None:
     """Add the option that restricts a bag to one actuator."""
-    help_text = 'use only topics below it; of a machine the name of an actuator'
-    parser.add_argument('--namespace', default='', help=help_text)
+    parser.add_argument(
+        '--namespace', default='', help='use only topics below it; of a machine the name of an actuator'
+    )
 
 
 def add_mapping(parser: Any) -> None:
     """Add the option for bags that tell nothing of their machine."""
     add_file(parser, '--mapping', 'machines', 'mapping file of the machine, for a bag without configuration')
+
+
+def add_bags(parser: Any) -> None:
+    """Add the argument for several bags."""
+    parser.add_argument('bags', type=place, nargs='+', metavar='BAG', help='path, or URL of fsspec')
 
 
 def mapping_of(arguments: argparse.Namespace) -> 'MappingFile | None':
@@ -158,7 +180,7 @@ def mapping_of(arguments: argparse.Namespace) -> 'MappingFile | None':
     Raises:
         ValueError: It cannot be read or is invalid.
     """
-    from seal_friction_ros.offline.bags.actuator_bag import read_mapping
+    from seal_friction_ros.offline.bags.mapped_bag import read_mapping
 
     return read_mapping(arguments.mapping) if arguments.mapping else None
 
@@ -191,18 +213,17 @@ def workers_of(arguments: argparse.Namespace) -> 'Workers':
 
     if arguments.scheduler is not None:
         return Cluster(arguments.scheduler, tuple(arguments.scheduler_tls) if arguments.scheduler_tls else None)
-    if arguments.scheduler_tls:
-        raise ValueError('--scheduler-tls is only for a --scheduler')
+    check_only_for(arguments, ['scheduler_tls'], 'a --scheduler')
     return arguments.workers or available_cores()
 
 
 def add_work(parser: argparse.ArgumentParser, *, has_failures: bool = True) -> None:
     """Add the option for the folder of finished parts, and for those that failed if they are kept, too."""
-    help_text = 'keep finished parts in this folder, and resume from them'
-    parser.add_argument('--work', type=Path, metavar='FOLDER', help=help_text)
-    if has_failures:
-        help_text = 'with --work: try again what failed before'
-        parser.add_argument('--retry-failed', action='store_true', help=help_text)
+    options: dict[str, tuple[str, Settings]] = {
+        '--work': ('keep finished parts in this folder, and resume from them', {'type': Path, 'metavar': 'FOLDER'}),
+        '--retry-failed': ('with --work: try again what failed before', {'action': 'store_true'}),
+    }
+    add_options(parser, options if has_failures else {'--work': options['--work']})
 
 
 def add_uncertainty(parser: argparse.ArgumentParser) -> None:
@@ -210,6 +231,17 @@ def add_uncertainty(parser: argparse.ArgumentParser) -> None:
     help_text = 'quantiles from so many samples of what the case says is unknown'
     parser.add_argument('--uncertain', type=at_least(2), metavar='N', help=help_text)
     parser.add_argument('--seed', type=at_least(0), metavar='S', help='with --uncertain: of the samples; default: 0')
+
+
+def check_only_for(arguments: argparse.Namespace, options: Iterable[str], what: str) -> None:
+    """Check that options are not given, since what they are for is not.
+
+    Raises:
+        ValueError: One is.
+    """
+    for name in options:
+        if getattr(arguments, name) not in (None, False, ''):
+            raise ValueError(f'--{name.replace("_", "-")} is only for {what}')
 
 
 def samples_of(arguments: argparse.Namespace) -> tuple[int, int] | None:
@@ -220,8 +252,7 @@ def samples_of(arguments: argparse.Namespace) -> tuple[int, int] | None:
     """
     if arguments.uncertain is not None:
         return arguments.uncertain, arguments.seed or 0
-    if arguments.seed is not None:
-        raise ValueError('--seed is only for --uncertain N')
+    check_only_for(arguments, ['seed'], '--uncertain N')
     return None
 
 
@@ -233,8 +264,8 @@ def kept_in(arguments: argparse.Namespace) -> 'Kept':
     """
     from seal_friction_ros.offline.work.finished_parts import Kept
 
-    if arguments.retry_failed and arguments.work is None:
-        raise ValueError('--retry-failed is only for a --work FOLDER')
+    if arguments.work is None:
+        check_only_for(arguments, ['retry_failed'], 'a --work FOLDER')
     return Kept(arguments.work, arguments.retry_failed)
 
 

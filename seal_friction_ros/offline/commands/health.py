@@ -1,32 +1,57 @@
-"""``seal_friction health``: how the seals are doing, over bags in order of time."""
+"""Commands on the seals over many bags: ``seal_friction`` ``health``, ``fleet``, ``adapt``."""
 
 import argparse
 import math
+from pathlib import Path
 from typing import Any
 
 from seal_friction_ros.offline.commands import command_line as cli
+from seal_friction_ros.offline.work.targets import SEAL_FILE, TABLE
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command."""
-    parser = cli.add_command(
-        commands, 'health', run, 'show how friction, offset and starts of the seals change over bags',
+    """Add the commands."""
+    health = cli.add_command(
+        commands, 'health', run_health, 'show how friction, offset and starts of the seals change over bags',
         'health monday tuesday wednesday --out health.html',
     )  # fmt: skip
-    parser.add_argument('bags', type=cli.place, nargs='+', metavar='BAG', help='path, or URL of fsspec')
-    cli.add_configuration(parser)
-    cli.add_namespace(parser)
-    cli.add_mapping(parser)
-    cli.add_page(parser, required=False)
-    cli.add_workers(parser, 'bags')
-    cli.add_work(parser)
-    parser.add_argument('--scale-low', type=cli.non_negative, default=0.6, help='alarm below this scale (0.6)')
-    parser.add_argument('--scale-high', type=cli.non_negative, default=1.5, help='alarm above this scale (1.5)')
-    parser.add_argument('--breakaway', type=cli.non_negative, default=2.5, help='alarm above this start (2.5)')
-    parser.add_argument('--noise', type=cli.non_negative, default=0.3, help='alarm above this share of residual (0.3)')
+    fleet = cli.add_command(
+        commands, 'fleet', run_fleet,
+        'show which seal drifts, which rig disagrees, which recording is damaged, of many bags',
+        'fleet bags --out fleet.html',
+        'fleet bags.txt --out fleet.html --parquet fleet.parquet --work build/fleet --scheduler tcp://HOST:8786',
+    )  # fmt: skip
+    adapt = cli.add_command(
+        commands, 'adapt', run_adapt, 'learn the friction of today from bags and save it as a seal file',
+        'adapt today --seal my_seal.yaml --out my_seal_today.yaml',
+    )  # fmt: skip
+    cli.add_bags(health)
+    help_text = 'folder with bags below it, or text file with the path or URL of a bag in each line'
+    fleet.add_argument('where', type=Path, metavar='DIR|LIST', help=help_text)
+    help_text = 'table with a row for each bag and pressure level'
+    cli.add_target(fleet, '--parquet', TABLE, metavar='FILE.parquet', help=help_text)
+    for parser in (health, fleet):
+        cli.add_configuration(parser)
+        cli.add_actuator(parser)
+        cli.add_page(parser, required=parser is fleet)
+        cli.add_workers(parser, 'bags')
+        cli.add_work(parser)
+    cli.add_options(health, _LIMITS)
+    adapt.add_argument('bags', type=Path, nargs='+', metavar='BAG')
+    cli.add_file(adapt, '--seal', 'seals', 'seal file to begin with', required=True, metavar='SEAL')
+    cli.add_namespace(adapt)
+    cli.add_target(adapt, '--out', SEAL_FILE, metavar='FILE', required=True, help='seal file to write')
 
 
-def run(arguments: argparse.Namespace) -> int:
+_LIMITS: dict[str, tuple[str, cli.Settings]] = {
+    '--scale-low': ('alarm below this scale (0.6)', {'type': cli.non_negative, 'default': 0.6}),
+    '--scale-high': ('alarm above this scale (1.5)', {'type': cli.non_negative, 'default': 1.5}),
+    '--breakaway': ('alarm above this start (2.5)', {'type': cli.non_negative, 'default': 2.5}),
+    '--noise': ('alarm above this share of residual (0.3)', {'type': cli.non_negative, 'default': 0.3}),
+}
+
+
+def run_health(arguments: argparse.Namespace) -> int:
     """Follow the bags in order of time."""
     from seal_friction_ros.offline.replay.bag_health import health_of_bags
     from seal_friction_ros.offline.replay.health_indicators import Limits
@@ -64,3 +89,45 @@ def run(arguments: argparse.Namespace) -> int:
 def _offset_text(offset: float) -> str:
     """Offset of the force sum [N]; without a force sum there is none."""
     return f'offset {offset:.4g} N' if math.isfinite(offset) else 'offset not told'
+
+
+def run_fleet(arguments: argparse.Namespace) -> int:
+    """Summarise every bag; write page and table."""
+    from seal_friction_ros.offline.bags.find_bags import find_bags
+    from seal_friction_ros.offline.replay.bag_parts import Chosen
+    from seal_friction_ros.offline.replay.bag_summary import DIFFERENT, summaries
+    from seal_friction_ros.offline.replay.replay import chosen_configuration
+    from seal_friction_ros.offline.reports.fleet_report import judged, write_fleet_report
+    from seal_friction_ros.offline.reports.fleet_table import write_fleet_table
+    from seal_friction_ros.packages import needed
+
+    if arguments.parquet:
+        needed('pyarrow')
+    override = chosen_configuration(arguments.params, arguments.seal)
+    chosen = Chosen(arguments.namespace, cli.mapping_of(arguments), override)
+    workers, kept = cli.workers_of(arguments), cli.kept_in(arguments)
+    paths = find_bags(arguments.where)
+    outcomes = summaries(paths, chosen, workers, kept)
+    bags = [judged(path, outcome) for path, outcome in zip(paths, outcomes, strict=True)]
+    report = write_fleet_report(bags, arguments.where, arguments.out)
+    if arguments.parquet:
+        write_fleet_table(bags, arguments.parquet)
+    counts = report.numbers['counts']
+    lines = [f'{len(bags)} bags: {", ".join(f"{count} {level}" for level, count in counts.items())}']
+    lines += [f'{bag.path}: {bag.level}: {bag.why}' for bag in bags if bag.summary is not None and bag.why]
+    damaged = [outcome.error for outcome in outcomes if outcome.error]
+    is_different = any(bag.summary is not None and bag.summary.replay == DIFFERENT for bag in bags)
+    code = cli.UNUSABLE if damaged else cli.DIFFERENT if is_different else cli.SUCCESS
+    return cli.print_result(arguments, report.numbers, '\n'.join(lines), code, damaged)
+
+
+def run_adapt(arguments: argparse.Namespace) -> int:
+    """Learn from the bags in the order given."""
+    from seal_friction_ros.offline.replay.adapted_seal import write_adapted_seal
+
+    numbers = write_adapted_seal(arguments.bags, arguments.seal, arguments.out, arguments.namespace)
+    summary = (
+        f'scale {numbers["scale"]:.4f} +- {numbers["scale_std"]:.4f} after {numbers["reversals"]} reversals; '
+        f'friction_scale {numbers["friction_scale"]:.4f}'
+    )
+    return cli.print_result(arguments, numbers, summary)

@@ -17,13 +17,8 @@ def add_parser(commands: Any) -> None:
         'identify bags/pull_test --out my_seal.yaml --next next.csv',
         'identify bags/cylinder --seal-kind rod=a --seal-kind piston=difference --out cylinder.yaml',
     )  # fmt: skip
-    parser.add_argument(
-        'sources',
-        type=cli.place,
-        nargs='+',
-        metavar='SOURCE',
-        help='bag, log, table or data sheet; path, or URL of fsspec',
-    )
+    text = 'bag, log, table or data sheet; path, or URL of fsspec'
+    parser.add_argument('sources', type=cli.place, nargs='+', metavar='SOURCE', help=text)
     cli.add_target(parser, '--out', SEAL_FILE, required=True, metavar='SEAL.yaml', help='seal file to write')
     cli.add_page(parser, '--report', required=False)
     cli.add_target(
@@ -31,62 +26,11 @@ def add_parser(commands: Any) -> None:
         help='data sheet of the pressures and speeds that would make the law certain; a page goes beside it',
     )  # fmt: skip
     cli.add_file(parser, '--rig', 'rigs', 'rig file of the logs')
-    _add_what_is_known(parser)
-    cli.add_namespace(parser)
-    cli.add_mapping(parser)
+    cli.add_file(parser, '--seal', 'seals', 'seal file with the geometry of the ring')
+    cli.add_options(parser, _WHAT_IS_KNOWN)
+    cli.add_actuator(parser)
     cli.add_workers(parser, 'sources, and groups of readings that are left out,')
     cli.add_work(parser, has_failures=False)
-
-
-def _add_what_is_known(parser: argparse.ArgumentParser) -> None:
-    """Options that say what is known of the seals, and how they are fitted."""
-    cli.add_file(parser, '--seal', 'seals', 'seal file with the geometry of the ring')
-    parser.add_argument(
-        '--squeeze-force', action='store_true', help='normal force from the geometry, even if --seal has one'
-    )
-    parser.add_argument(
-        '--seal-chambers',
-        dest='chambers',
-        type=_chambers,
-        metavar='a,b',
-        help='what each seal sees: a, b, difference or ambient',
-    )
-    parser.add_argument(
-        '--seal-kind',
-        dest='kinds',
-        type=_kind,
-        action='append',
-        metavar='NAME=a,b',
-        help='one of several kinds of seals in the cylinder and what each of its seals sees; one file a kind',
-    )
-    parser.add_argument(
-        '--largest-kind-error',
-        type=cli.non_negative,
-        metavar='SHARE',
-        help='standard error of a kind up to which it is told from the others, a share of its friction (0.1)',
-    )
-    parser.add_argument('--law', help='law to save instead of the recommended one')
-    parser.add_argument(
-        '--run-to-run',
-        type=cli.non_negative,
-        metavar='SHARE',
-        help='relative standard deviation between runs, if known',
-    )
-    parser.add_argument(
-        '--presliding',
-        action='store_true',
-        help='identify the elasticity of the seals from the reversals of logs or bags, too',
-    )
-    parser.add_argument(
-        '--refuse-changed',
-        action='store_true',
-        help='refuse sources whose friction differs by more than 15 %% instead of fitting them together',
-    )
-    parser.add_argument('--name', default='', help='name of the seal; default: that of the file')
-    parser.add_argument('--slowest', type=cli.non_negative, metavar='M/S', help='a slower rod counts as at rest')
-    parser.add_argument(
-        '--largest-acceleration', type=cli.non_negative, metavar='M/S2', help='samples beyond it are not used'
-    )
 
 
 def _chambers(text: str) -> tuple[str, ...]:
@@ -104,6 +48,28 @@ def _kind(text: str) -> tuple[str, tuple[str, ...]]:
         raise argparse.ArgumentTypeError(f'{text} is not a name and chambers like rod=a,b')
     return name, _chambers(chambers)
 
+
+_FLAG = {'action': 'store_true'}
+_SHARE = {'type': cli.non_negative, 'metavar': 'SHARE'}
+_ONE_KIND = 'one of several kinds of seals in the cylinder and what each of its seals sees; one file a kind'
+_KIND_ERROR = 'standard error of a kind up to which it is told from the others, a share of its friction (0.1)'
+_CHANGED = 'refuse sources whose friction differs by more than 15 %% instead of fitting them together'
+_WHAT_IS_KNOWN: dict[str, tuple[str, cli.Settings]] = {
+    '--squeeze-force': ('normal force from the geometry, even if --seal has one', _FLAG),
+    '--seal-chambers': (
+        'what each seal sees: a, b, difference or ambient', {'dest': 'chambers', 'type': _chambers, 'metavar': 'a,b'}
+    ),
+    '--seal-kind': (_ONE_KIND, {'dest': 'kinds', 'type': _kind, 'action': 'append', 'metavar': 'NAME=a,b'}),
+    '--largest-kind-error': (_KIND_ERROR, _SHARE),
+    '--law': ('law to save instead of the recommended one', {}),
+    '--run-to-run': ('relative standard deviation between runs, if known', _SHARE),
+    '--presliding': ('identify the elasticity of the seals from the reversals of logs or bags, too', _FLAG),
+    '--refuse-changed': (_CHANGED, _FLAG),
+    '--name': ('name of the seal; default: that of the file', {'default': ''}),
+    '--slowest': ('a slower rod counts as at rest', {'type': cli.non_negative, 'metavar': 'M/S'}),
+    '--largest-acceleration': ('samples beyond it are not used', {'type': cli.non_negative, 'metavar': 'M/S2'}),
+}  # fmt: skip
+"""what is known of the seals, and how they are fitted"""
 
 NOT_FOR_KINDS = (
     'seal', 'squeeze_force', 'chambers', 'law', 'refuse_changed', 'presliding', 'workers',

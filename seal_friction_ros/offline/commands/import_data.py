@@ -62,8 +62,8 @@ def run_log(arguments: argparse.Namespace) -> int:
 
 def run_bag(arguments: argparse.Namespace) -> int:
     """Import a bag with standard messages, or several in parallel."""
-    from seal_friction_ros.offline.bags.actuator_bag import read_mapping
     from seal_friction_ros.offline.bags.import_bag import convert_bag
+    from seal_friction_ros.offline.bags.mapped_bag import read_mapping
 
     mapping = read_mapping(arguments.mapping)
     convert = partial(convert_bag, mapping=mapping, also=arguments.also)

@@ -12,25 +12,16 @@ import textwrap
 
 from seal_friction_ros.compiled_code import keep_compiled_code
 from seal_friction_ros.offline.commands import (
-    adapt,
-    charts,
-    compare,
+    bags,
     doctor,
     ehl,
-    fleet,
     health,
     identify,
     import_data,
-    info,
     monitor,
     new,
     oring,
-    recover,
-    replay,
-    report,
     seals,
-    servo,
-    sheet,
     topics,
     tune,
 )
@@ -42,10 +33,10 @@ from seal_friction_ros.offline.work.status import as_typed, show_status
 from seal_friction_ros.packages import as_missing, needed
 
 GROUPS = {
-    'replay': (info, replay, compare, recover, report, import_data),
-    'identify': (identify, sheet, *of_studies('commands.spool'), seals, charts),
-    'watch': (monitor, topics, health, fleet, adapt),
-    'tune': (tune, servo),
+    'replay': (bags, import_data),
+    'identify': (identify, *of_studies('commands.spool'), seals),
+    'watch': (monitor, topics, health),
+    'tune': (tune,),
     'compute': (oring, ehl),
     'machine': (new, doctor),
 }

@@ -33,9 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     samples, workers = cli.samples_of(arguments), cli.workers_of(arguments)
     if not samples:
-        for option in ('workers', 'scheduler', 'work'):
-            if getattr(arguments, option) is not None:
-                raise ValueError(f'--{option} is only for --uncertain N')
+        cli.check_only_for(arguments, ('workers', 'scheduler', 'work'), '--uncertain N')
     path = config_path('oring', arguments.case)
     computed = compute_case(
         path, arguments.pressures, for_seal_file=arguments.out is not None, for_samples=bool(samples)

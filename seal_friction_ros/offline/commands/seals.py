@@ -1,24 +1,85 @@
-"""``seal_friction seals``: list the seals that there are."""
+"""Commands on seal files and data sheets: ``seal_friction`` ``sheet``, ``seals``, ``charts``."""
 
 import argparse
 from pathlib import Path
 from typing import Any
 
 from seal_friction_ros.offline.commands import command_line as cli
+from seal_friction_ros.offline.work.targets import DATA_SHEET
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command."""
-    parser = cli.add_command(
-        commands, 'seals', run, 'list the seal files with law, range and source',
-        'seals',
-        'seals my_seals --full',
+    """Add the commands."""
+    sheet = cli.add_command(
+        commands, 'sheet', run_sheet, 'make an empty data sheet of the friction test plan: CSV, and a page to print',
+        'sheet rod_seal --seal ms28775_114 --out sheet.csv',
     )  # fmt: skip
-    parser.add_argument('folders', type=Path, nargs='*', metavar='FOLDER', help='default: config/seals')
-    parser.add_argument('--full', action='store_true', help='print the whole source of each seal')
+    seals = cli.add_command(
+        commands, 'seals', run_seals, 'list the seal files with law, range and source', 'seals', 'seals my_seals --full'
+    )
+    charts = cli.add_command(
+        commands, 'charts', run_charts, 'write a page with the curves of a seal file',
+        'charts ms28775_114 --out ms28775_114.html',
+    )  # fmt: skip
+    text = 'sheet to write; a page goes beside it'
+    cli.add_target(sheet, '--out', DATA_SHEET, required=True, metavar='SHEET.csv', help=text)
+    cli.add_file(sheet, '--seal', 'seals', 'seal file whose geometry is filled in')
+    cli.add_options(sheet, _OF_SHEET)
+    seals.add_argument('folders', type=Path, nargs='*', metavar='FOLDER', help='default: config/seals')
+    seals.add_argument('--full', action='store_true', help='print the whole source of each seal')
+    cli.add_file(charts, 'seal', 'seals', 'seal file', metavar='SEAL')
+    cli.add_page(charts)
 
 
-def run(arguments: argparse.Namespace) -> int:
+def _pressures(text: str) -> tuple[float, float, int]:
+    try:
+        low, high, steps = text.split(':')
+        return float(low), float(high), int(steps)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'{text} is not LOW:HIGH:STEPS, for example 0:70:10') from None
+
+
+_PRESSURES = {'type': _pressures, 'default': (0.0, 70.0, 10), 'metavar': 'LOW:HIGH:STEPS'}
+_OF_SHEET: dict[str, tuple[str, cli.Settings]] = {
+    'name': ('name of the seal', {}),
+    '--pressures': ('default 0:70:10', _PRESSURES),
+    '--tests': ('default 3', {'type': int, 'default': 3}),
+    '--seals': ('seals that share the pressure, default 2', {'type': int, 'default': 2}),
+    '--pressure-unit': ('default bar', {'choices': ('bar', 'MPa', 'kPa', 'psi'), 'default': 'bar'}),
+    '--force-unit': ('default N', {'choices': ('N', 'kN', 'lbf'), 'default': 'N'}),
+    '--length-unit': ('default mm', {'choices': ('mm', 'in'), 'default': 'mm'}),
+}
+
+
+def run_sheet(arguments: argparse.Namespace) -> int:
+    """Write the sheet."""
+    from seal_friction_ros.offline.identification.data_sheet import (
+        FrictionTestPlan,
+        geometry_of_seal_file,
+        write_sheet,
+    )
+    from seal_friction_ros.offline.reports.data_sheet_page import write_data_sheet_page
+
+    low, high, steps = arguments.pressures
+    plan = FrictionTestPlan(
+        arguments.name,
+        low,
+        high,
+        steps,
+        tests=arguments.tests,
+        seals=arguments.seals,
+        pressure_unit=arguments.pressure_unit,
+        force_unit=arguments.force_unit,
+        length_unit=arguments.length_unit,
+        geometry=geometry_of_seal_file(arguments.seal)[0] if arguments.seal else None,
+    )
+    sheet, page = arguments.out, arguments.out.with_suffix('.html')
+    write_sheet(plan, sheet)
+    write_data_sheet_page(plan, page)
+    return cli.print_result(arguments, {'sheet': sheet, 'page': page}, '')
+
+
+def run_seals(arguments: argparse.Namespace) -> int:
     """Print a line or two for each seal file; exit code 1 if one of them cannot be used."""
     from seal_friction_ros.offline.work.seal_list import listed_seals, seal_text
 
@@ -26,3 +87,12 @@ def run(arguments: argparse.Namespace) -> int:
     text = '\n'.join(seal_text(seal, full=arguments.full) for seal in listed)
     unusable = any(seal.error for seal in listed)
     return cli.print_result(arguments, {'seals': listed}, text, cli.DIFFERENT if unusable else cli.SUCCESS)
+
+
+def run_charts(arguments: argparse.Namespace) -> int:
+    """Write the page."""
+    from seal_friction_ros.files import config_path
+    from seal_friction_ros.offline.reports.seal_charts import write_seal_charts
+
+    numbers = write_seal_charts(config_path('seals', arguments.seal), arguments.out)
+    return cli.print_result(arguments, numbers, '')

@@ -1,4 +1,4 @@
-"""``seal_friction tune``: tune the friction feed-forward."""
+"""``seal_friction tune``: tune the friction feed-forward; ``seal_friction servo``: a simulated servo."""
 
 import argparse
 from pathlib import Path
@@ -11,7 +11,7 @@ from seal_friction_ros.offline.work.targets import PARAMETER_FILE
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command."""
+    """Add the commands."""
     parser = cli.add_command(
         commands, 'tune', run, 'tune the friction feed-forward on a simulated servo or on a recorded axis',
         'tune --out feedforward.yaml',
@@ -33,8 +33,7 @@ def add_parser(commands: Any) -> None:
     help_text = 'parameter file to write; a report goes beside it'
     cli.add_target(parser, '--out', PARAMETER_FILE, required=True, metavar='FILE.yaml', help=help_text)
     cli.add_configuration(parser)
-    cli.add_namespace(recorded)
-    cli.add_mapping(recorded)
+    cli.add_actuator(recorded)
     help_text = 'write the parameters of this actuator of machine_estimator; default: that of the bag, if it has any'
     parser.add_argument('--actuator', default='', metavar='NAME', help=help_text)
     for name, meaning in _settings().items():
@@ -43,6 +42,8 @@ def add_parser(commands: Any) -> None:
         number = int if name == 'seed' else float
         kinds = tuple(kind for kind in (TuningSettings, RecordedAxisSettings) if name in meanings(kind))
         groups[kinds].add_argument(f'--{name.replace("_", "-")}', type=number, metavar='X', help=text)
+    description = 'write a page on a simulated servo with and without friction'
+    cli.add_page(cli.add_command(commands, 'servo', run_servo, description, 'servo --out servo.html', needs=('numba',)))
 
 
 def _settings() -> dict[str, Meaning]:
@@ -52,6 +53,7 @@ def _settings() -> dict[str, Meaning]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Tune on the simulated servo or on a bag."""
+    from seal_friction_ros.offline.bags.actuator_bag import open_actuator
     from seal_friction_ros.offline.replay.replay import chosen_configuration
     from seal_friction_ros.offline.reports.tune_report import write_tuning_page
     from seal_friction_ros.offline.tuning.recorded_command import read_output_gain
@@ -69,10 +71,11 @@ def run(arguments: argparse.Namespace) -> int:
     configuration = chosen_configuration(arguments.params, arguments.seal)
     gain, actuator = None, arguments.actuator
     if arguments.bag:
-        known, one = RecordedAxisSettings(**given), (arguments.namespace, cli.mapping_of(arguments))
+        known = RecordedAxisSettings(**given)
+        axis = open_actuator(arguments.bag, arguments.namespace, cli.mapping_of(arguments))
         if arguments.command_topic:
-            gain = read_output_gain(arguments.bag, arguments.command_topic, known, *one)
-        tuning: Any = tune_bag(arguments.bag, known, configuration, *one)
+            gain = read_output_gain(axis, arguments.command_topic, known)
+        tuning: Any = tune_bag(axis, known, configuration)
         actuator = actuator or tuning.actuator
     else:
         machine = load_machine(arguments.machine) if arguments.machine else DEFAULT_MACHINE
@@ -100,11 +103,16 @@ def _given(arguments: argparse.Namespace) -> dict[str, Any]:
     kind, other = (RecordedAxisSettings, TuningSettings) if arguments.bag else (TuningSettings, RecordedAxisSettings)
     given = {name: value for name in _settings() if (value := getattr(arguments, name)) is not None}
     foreign = [name for name in given if name in meanings(other) and name not in meanings(kind)]
-    foreign += ['machine'] if arguments.machine and arguments.bag else []
-    foreign += ['namespace'] if arguments.namespace and not arguments.bag else []
-    foreign += ['mapping'] if arguments.mapping and not arguments.bag else []
-    foreign += ['command_topic'] if arguments.command_topic and not arguments.bag else []
+    others = ('machine',) if arguments.bag else ('namespace', 'mapping', 'command_topic')
+    foreign += [name for name in others if getattr(arguments, name)]
     if foreign:
         name = foreign[0].replace('_', '-')
         raise ValueError(f'--{name} is {"not for" if arguments.bag else "only for"} a --bag')
     return given
+
+
+def run_servo(arguments: argparse.Namespace) -> int:
+    """Simulate and write the page."""
+    from seal_friction_ros.offline.reports.servo_charts import write_servo_charts
+
+    return cli.print_result(arguments, write_servo_charts(arguments.out), '')

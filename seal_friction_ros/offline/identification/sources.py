@@ -28,9 +28,10 @@ from seal_friction_ros.core.identification.prepare_readings import prepare_logs,
 from seal_friction_ros.core.identification.readings import ManualReadings, PreparedReadings, RecordedLog, check_clipping
 from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding, bridged
 from seal_friction_ros.files import config_path, share_directory
-from seal_friction_ros.offline.bags.actuator_bag import MappingFile, open_actuator
+from seal_friction_ros.offline.bags.actuator_bag import open_actuator
 from seal_friction_ros.offline.bags.columns import read_velocity_rows
 from seal_friction_ros.offline.bags.import_log import read_samples
+from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 from seal_friction_ros.offline.bags.rig_file import Rig, read_rig
 from seal_friction_ros.offline.identification.data_sheet import TITLE, parse_number, read_data_sheet, read_text
 from seal_friction_ros.offline.identification.load_numbers import load_text

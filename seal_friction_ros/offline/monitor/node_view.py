@@ -14,8 +14,8 @@ from seal_friction_ros.core.machine.machine import Machine, init
 from seal_friction_ros.core.machine.machine_snapshot import machine_of, parse_machine_text
 from seal_friction_ros.core.machine.message_fields import Definition
 from seal_friction_ros.core.machine.newest_messages import decode_newest
-from seal_friction_ros.offline.bags.actuator_bag import Translation
 from seal_friction_ros.offline.bags.bag import BagMessage
+from seal_friction_ros.offline.bags.mapped_bag import Translation
 from seal_friction_ros.offline.monitor.actuator_view import (
     NOTHING_HELD,
     NOTHING_SAID,

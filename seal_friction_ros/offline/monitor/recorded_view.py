@@ -8,10 +8,16 @@ from typing import Any
 
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, ESTIMATE_TYPE
 from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE
-from seal_friction_ros.offline.bags.actuator_bag import MACHINE_CONFIGURATION, MappingFile, machine_messages
-from seal_friction_ros.offline.bags.bag import BagError, BagMessage, TopicInfo, bag_topics, read_messages
-from seal_friction_ros.offline.bags.definitions import read_definitions
-from seal_friction_ros.offline.bags.topics import RECORDED
+from seal_friction_ros.offline.bags.actuator_bag import RECORDED
+from seal_friction_ros.offline.bags.bag import (
+    BagError,
+    BagMessage,
+    TopicInfo,
+    bag_topics,
+    read_definitions,
+    read_messages,
+)
+from seal_friction_ros.offline.bags.mapped_bag import MACHINE_CONFIGURATION, MappingFile, machine_messages
 from seal_friction_ros.offline.monitor.actuator_view import (
     COLUMNS,
     RECENT,

@@ -2,9 +2,8 @@
 
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass
 from itertools import islice
-from typing import Any
+from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation.configuration import ALGORITHM_VERSION
 from seal_friction_ros.core.estimation.messages import DECODERS, ESTIMATE_TYPE, FEEDFORWARD_TYPE, GROWN
@@ -13,8 +12,7 @@ from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE
 LONGEST_QUEUE = 100_000  # replayed answers that may wait for a recorded one; bounds memory if recording has stopped
 
 
-@dataclass(frozen=True)
-class ReplayResult:
+class ReplayResult(NamedTuple):
     """Result of a replay."""
 
     velocity_samples: int
@@ -32,7 +30,7 @@ class ReplayResult:
 
     def numbers(self) -> dict[str, Any]:
         """Numbers for JSON."""
-        return {**asdict(self), 'version': ALGORITHM_VERSION, 'identical': self.identical}
+        return {**self._asdict(), 'version': ALGORITHM_VERSION, 'identical': self.identical}
 
     def summary(self, *, verified: bool) -> str:
         """One line for a person; ``verified``: about the comparison with the recorded answers."""

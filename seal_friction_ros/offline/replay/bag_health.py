@@ -5,7 +5,7 @@ with its length.
 """
 
 import dataclasses
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,24 +13,24 @@ import numpy as np
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationState
 from seal_friction_ros.core.estimation.adaptation import learnt as learnt_of
-from seal_friction_ros.core.estimation.compiled_pipeline import Answers, receive_all
-from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
+from seal_friction_ros.core.estimation.compiled_pipeline import Answers
+from seal_friction_ros.core.estimation.configuration import Configuration, Snapshot
 from seal_friction_ros.core.estimation.estimator import DEFAULT_ADAPTATION
 from seal_friction_ros.core.estimation.friction_filter import PROVEN
-from seal_friction_ros.core.estimation.message_blocks import Kind, Messages, UnsuitedError
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, ESTIMATE_TYPE
-from seal_friction_ros.core.estimation.pipeline import init
+from seal_friction_ros.core.estimation.message_blocks import Messages, UnsuitedError
+from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE
 from seal_friction_ros.core.estimation.records import NEVER, NO_ESTIMATE, FrictionEstimate
 from seal_friction_ros.core.estimation.seal_health import START, Starts, with_sample
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.friction.states import SLIDING
 from seal_friction_ros.files import default_configuration
-from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag, MappingFile, open_actuator
+from seal_friction_ros.offline.bags.actuator_bag import open_actuator
 from seal_friction_ros.offline.bags.bag import BagError
 from seal_friction_ros.offline.bags.columns import numbers_of
+from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS
 from seal_friction_ros.offline.replay.bag_parts import Chosen, try_bags
-from seal_friction_ros.offline.replay.compiled_replay import compile_now, first_configurations, kinds_of_topics
+from seal_friction_ros.offline.replay.compiled_replay import Run, compile_now, first_configurations, kinds_of_topics
 from seal_friction_ros.offline.work.executor import Workers
 from seal_friction_ros.offline.work.finished_parts import NOWHERE, Kept
 from seal_friction_ros.offline.work.outcome import Outcome
@@ -48,9 +48,6 @@ class BagHealth(NamedTuple):
     noise: float  # [N] standard deviation of the residual at even speed, at the end; NaN if none was seen
     starts: FloatArray  # [-] largest friction of each start after a rest, over the Coulomb friction then
     learnt: AdaptationState | None = None  # at the end; None if the bag has no estimate, or it was not asked for
-
-
-_NAMES = tuple(name for name in BagHealth._fields if name != 'learnt')
 
 
 def bag_health(
@@ -79,12 +76,18 @@ def bag_health(
     starts: list[float] = []
     end, follower, strokes = learnt, Starts(), _Strokes()
     source = open_actuator(bag, namespace, mapping)
+    run = _Observer(_observing(override or default_configuration()), has_override=override is not None)
+    if learnt is not None:
+        run.learn_on(learnt)
     try:
-        for estimates, known in _observed(source, override, learnt, on_block):
-            end = known
-            rows.append(strokes.ends(estimates))
-            follower, found = _with_block(follower, estimates)
-            starts += found
+        for messages, answers in run.answered(source.blocks(kinds_of_topics(source.topics))):
+            estimates = _estimates(answers)
+            on_block(messages, answers, estimates)
+            if len(estimates):
+                end = run.state.estimator.adaptation
+                rows.append(strokes.ends(estimates))
+                follower, found = _with_block(follower, estimates)
+                starts += found
     except (UnsuitedError, OSError, *ERRORS) as error:
         raise BagError(f'{bag}: {error}: `seal_friction replay` tells more') from None
     table = np.concatenate(rows, axis=1) if rows else np.zeros((5, 0))
@@ -109,16 +112,14 @@ def health_of_bags(
     Raises:
         ValueError: The work folder or the cluster cannot be used.
     """
-    outcomes = try_bags(
-        'health', bags, _NAMES, _values, Chosen(namespace, mapping, override), workers, kept,
+    return try_bags(
+        'health', bags, BagHealth, _health, Chosen(namespace, mapping, override), workers, kept,
         lambda: compile_now(first_configurations(bags, namespace, override, mapping)),
     )  # fmt: skip
-    return [Outcome(BagHealth(**one.result) if one.result else None, one.error) for one in outcomes]
 
 
-def _values(bag: Path, chosen: Chosen) -> dict[str, Any]:
-    found = bag_health(bag, chosen.namespace, chosen.override, mapping=chosen.mapping)._asdict()
-    return {name: found[name] for name in _NAMES}
+def _health(bag: Path, chosen: Chosen) -> BagHealth:
+    return bag_health(bag, chosen.namespace, chosen.override, mapping=chosen.mapping)._replace(learnt=None)
 
 
 class _Strokes:
@@ -159,35 +160,18 @@ def _with_block(starts: Starts, estimates: Any) -> tuple[Starts, list[float]]:
     return starts, found
 
 
-def _observed(
-    source: ActuatorBag,
-    override: Configuration | None,
-    learnt: AdaptationState | None,
-    on_block: Callable[[Messages, Answers, Any], None],
-) -> Iterator[tuple[Any, AdaptationState]]:
-    """Estimates of each block, as a structured array, and the state of the adaptation after it."""
-    configuration = _observing(override or default_configuration())
-    parameters = configuration.parameters()
-    state = init(parameters)
-    if learnt is not None:
-        state = state._replace(estimator=state.estimator._replace(adaptation=learnt))
-    for block in source.blocks(kinds_of_topics(source.topics)):
-        changes = np.flatnonzero(block.kinds == Kind.CONFIGURATION).tolist()
-        for first, end in zip([0, *changes], [*changes, len(block.kinds)], strict=True):
-            if first == end:
-                continue
-            messages = block.taken(first, end)
-            if messages.kinds[0] == Kind.CONFIGURATION:
-                snapshot = parse_snapshot(DECODERS[CONFIGURATION_TYPE](messages.message(0)))
-                kept = state.estimator.adaptation
-                state = snapshot.state._replace(estimator=snapshot.state.estimator._replace(adaptation=kept))
-                if override is None:
-                    parameters = _observing(snapshot.configuration).parameters()
-            state, answers = receive_all(parameters, state, messages)
-            estimates = _estimates(answers)
-            on_block(messages, answers, estimates)
-            if len(estimates):
-                yield estimates, state.estimator.adaptation
+class _Observer(Run):
+    """Estimator with ``adaptation.mode`` observe, which keeps what it has learnt when the configuration changes."""
+
+    def learn_on(self, learnt: AdaptationState) -> None:
+        """Go on with what was learnt before."""
+        self.state = self.state._replace(estimator=self.state.estimator._replace(adaptation=learnt))
+
+    def configure(self, snapshot: Snapshot) -> None:
+        """Take a recorded configuration."""
+        learnt = self.state.estimator.adaptation
+        super().configure(snapshot._replace(configuration=_observing(snapshot.configuration)))
+        self.learn_on(learnt)
 
 
 def _observing(configuration: Configuration) -> Configuration:

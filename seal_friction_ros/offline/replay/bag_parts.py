@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation.configuration import Configuration, first_snapshot, snapshot_text
-from seal_friction_ros.offline.bags.actuator_bag import MappingFile
+from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 from seal_friction_ros.offline.work.executor import Workers, nothing
 from seal_friction_ros.offline.work.finished_parts import (
     Kept,
     Part,
-    Values,
     content_of,
     input_digests,
     part_key,
@@ -35,20 +34,20 @@ AS_RECORDED = Chosen()
 def try_bags(
     kind: str,
     bags: Sequence[Place],
-    names: tuple[str, ...],
+    record: Any,
     call: Callable[[Path, Chosen], Any],
     chosen: Chosen,
     workers: Workers,
     kept: Kept,
     prepare: Callable[[], None] = nothing,
-) -> list[Outcome[Values]]:
+) -> list[Outcome[Any]]:
     """Outcome of a computation on each bag, in the order of the bags.
 
     Args:
         kind: What is computed, also the label of the progress bar.
         bags: The bags: paths, or URLs that are copied where they are computed.
-        names: Of the values in a result.
-        call: Picklable function of a bag and ``chosen``, with a result as of `Part`.
+        record: Named tuple of a result.
+        call: Picklable function of a bag and ``chosen`` that makes a record, whose values are as of `Part`.
         chosen: What of each bag is used, and how.
         workers: Bags at a time, or a cluster.
         kept: Where outcomes are kept, by content and path of a bag and by the settings.
@@ -67,9 +66,12 @@ def try_bags(
             part_key(kind, [str(bag), one.result or one.error, *known]) for bag, one in zip(bags, digests, strict=True)
         ]
     calls = [partial(_computed, bag, call, chosen) for bag in bags]
-    parts = [Part(key, names, one) for key, one in zip(keys, calls, strict=True)]
+    parts = [Part(key, record._fields, one) for key, one in zip(keys, calls, strict=True)]
     outcomes = try_parts(f'{kind} of {len(bags)} bags', parts, workers, kept, prepare)
-    return [o._replace(error=_naming(bag, o.error)) if o.error else o for bag, o in zip(bags, outcomes, strict=True)]
+    return [
+        Outcome(None, _naming(bag, error)) if values is None else Outcome(record(**values))
+        for bag, (values, error) in zip(bags, outcomes, strict=True)
+    ]
 
 
 def _computed(bag: Place, call: Callable[[Path, Chosen], Any], chosen: Chosen) -> Any:

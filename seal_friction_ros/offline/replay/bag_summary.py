@@ -21,7 +21,7 @@ from seal_friction_ros.offline.replay.compiled_replay import compile_now, first_
 from seal_friction_ros.offline.replay.health_indicators import Limits, alarms_of, day_of
 from seal_friction_ros.offline.replay.parallel_replay import verify
 from seal_friction_ros.offline.work.executor import Workers
-from seal_friction_ros.offline.work.finished_parts import Kept, Values
+from seal_friction_ros.offline.work.finished_parts import Kept
 from seal_friction_ros.offline.work.outcome import Outcome
 from seal_friction_ros.offline.work.places import Place
 
@@ -188,11 +188,12 @@ def summaries(bags: Sequence[Place], chosen: Chosen, workers: Workers, kept: Kep
     """
     first = bags[:_COMPILED_BAGS]
     outcomes = try_bags(
-        'fleet', bags, BagSummary._fields, bag_summary, chosen, workers, kept,
+        'fleet', bags, BagSummary, bag_summary, chosen, workers, kept,
         lambda: compile_now(first_configurations(first, chosen.namespace, chosen.override, chosen.mapping)),
     )  # fmt: skip
-    return [Outcome(_of_values(one.result) if one.result else None, one.error) for one in outcomes]
+    return [one._replace(result=one.result and _with_rows(one.result)) for one in outcomes]
 
 
-def _of_values(values: Values) -> BagSummary:
-    return BagSummary(**{**values, 'levels': np.reshape(values['levels'], (-1, len(LEVEL_COLUMNS)))})
+def _with_rows(kept: BagSummary) -> BagSummary:
+    """An empty table has no columns in JSON."""
+    return kept._replace(levels=np.reshape(kept.levels, (-1, len(LEVEL_COLUMNS))))

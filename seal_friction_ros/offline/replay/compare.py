@@ -1,7 +1,7 @@
 """Comparison of one topic of two bags, paired by stamp: first, largest and root mean square difference."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, astuple, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -11,8 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from seal_friction_ros.core.estimation.messages import DECODERS, ESTIMATE_TYPE
-from seal_friction_ros.offline.bags.actuator_bag import MappingFile, is_of_machine, open_actuator
-from seal_friction_ros.offline.bags.bag import BagError, BagMessage, TopicInfo, bag_topics, read_messages
+from seal_friction_ros.offline.bags.actuator_bag import find_topic, open_actuator, recorded_machine
+from seal_friction_ros.offline.bags.bag import BagError, BagMessage, bag_topics, named, read_messages
+from seal_friction_ros.offline.bags.mapped_bag import MappingFile, is_for
 
 
 @dataclass(frozen=True)
@@ -193,28 +194,22 @@ def _stamps(topic: _Topic) -> _Numbers:
 def _topic_of(bag: Path, name: str, namespace: str, mapping: MappingFile | None) -> _Topic:
     """Topic to compare: ``name``, else that of the estimates; of a machine one of those of an actuator."""
     known = bag_topics(bag)
-    if name not in known and is_of_machine(bag, known, mapping):
+    is_mapped = recorded_machine(bag, known) is not None if mapping is None else is_for(mapping, known)
+    if name not in known and is_mapped:
         actuator = open_actuator(bag, namespace, mapping)
         return _Topic(bag, name or actuator.topics.estimate, partial(actuator.messages, with_answers=True))
-    return _Topic(bag, name or _estimate_topic(bag, known, namespace), partial(read_messages, bag))
-
-
-def _estimate_topic(bag: Path, known: Mapping[str, TopicInfo], namespace: str) -> str:
     found = [topic for topic, info in known.items() if info.type_name == ESTIMATE_TYPE]
-    if len(found) > 1 and namespace:
-        found = [topic for topic in found if topic.startswith(f'/{namespace.strip("/")}/')]
-    if len(found) != 1:
-        raise BagError(f'{bag}: {len(found)} topics of {ESTIMATE_TYPE}: choose one with --topic or --namespace')
-    return found[0]
+    topic = name or (found[0] if len(found) == 1 else find_topic(bag, ESTIMATE_TYPE, namespace, known))
+    if not topic:
+        raise BagError(f'{bag}: no {ESTIMATE_TYPE} in it: choose a topic with --topic')
+    return _Topic(bag, topic, partial(read_messages, bag))
 
 
 def _fields(bag: Path, message: BagMessage) -> dict[str, Any]:
     if message.type_name not in DECODERS:
         raise BagError(f'{bag}: {message.topic} is {message.type_name}, not a message type of this project')
-    try:
+    with named(bag, message):
         record = DECODERS[message.type_name](message.data)
-    except ValueError as error:
-        raise BagError(f'{bag}: message on {message.topic} at {message.log_time} ns: {error}') from None
     return record._asdict() if hasattr(record, '_asdict') else {'text': record}
 
 

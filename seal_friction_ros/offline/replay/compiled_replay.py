@@ -22,11 +22,11 @@ from seal_friction_ros.core.estimation.pipeline import PipelineState, init
 from seal_friction_ros.core.foundation.compiled import compiled
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.bags import block_reader
-from seal_friction_ros.offline.bags.actuator_bag import MappingFile, open_actuator
+from seal_friction_ros.offline.bags.actuator_bag import TYPES, Topics, first_snapshot, open_actuator
+from seal_friction_ros.offline.bags.bag import KindOf
 from seal_friction_ros.offline.bags.block_reader import read_in_bulk
-from seal_friction_ros.offline.bags.gathered import KindOf
+from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS
-from seal_friction_ros.offline.bags.topics import TYPES, Topics
 from seal_friction_ros.offline.replay.answer_comparison import AnswerStream, ReplayResult, replay_result
 from seal_friction_ros.offline.work.places import Place
 
@@ -55,15 +55,11 @@ def replay_in_bulk(
         advance(messages)
 
     try:
-        return _replay(bag, topics, override, count)
+        run = Run(override or default_configuration(), has_override=override is not None)
+        return run.compared(read_in_bulk(bag, kinds_of_topics(topics)), topics, count)
     except (UnsuitedError, OSError, *ERRORS):
         advance(-done)
         return None
-
-
-def _replay(bag: Path, topics: Topics, override: Configuration | None, advance: Callable[[int], None]) -> ReplayResult:
-    run = Run(override or default_configuration(), has_override=override is not None)
-    return run.compared(read_in_bulk(bag, kinds_of_topics(topics)), topics, advance)
 
 
 class Run:
@@ -125,13 +121,14 @@ class Run:
             for first, end in pairwise(ends):
                 messages = block.taken(first, end)
                 if messages.kinds[0] == Kind.CONFIGURATION:
-                    self._configure(parse_snapshot(decode_text(messages.message(0))))
+                    self.configure(parse_snapshot(decode_text(messages.message(0))))
                 if not self._tells_sending:
                     messages = messages._replace(sent=messages.received)
                 self.state, answers = receive_all(self._parameters, self.state, messages)
                 yield messages, answers
 
-    def _configure(self, snapshot: Snapshot) -> None:
+    def configure(self, snapshot: Snapshot) -> None:
+        """Take a recorded configuration, with its state."""
         configuration, self.state = snapshot.configuration, snapshot.state
         self._tells_sending = configuration.tells_sending
         if not self._has_override:
@@ -176,12 +173,10 @@ def _first_configuration(bag: Path, namespace: str, mapping: MappingFile | None)
     try:
         source = open_actuator(bag, namespace, mapping)
         topic = source.topics.configuration
-        if topic:
-            first = next(message.data for message in source.messages() if message.topic == topic)
-            return parse_snapshot(decode_text(first)).configuration
-    except (StopIteration, ValueError, OSError, *ERRORS):
-        pass
-    return default_configuration()
+        first = first_snapshot(bag, source.messages(), topic) if topic else None
+    except (ValueError, OSError, *ERRORS):
+        first = None
+    return default_configuration() if first is None else first.configurations['']
 
 
 def kinds_of_topics(topics: Topics) -> KindOf:

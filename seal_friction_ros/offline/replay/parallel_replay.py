@@ -2,15 +2,13 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import asdict, fields
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from seal_friction_ros.core.estimation.configuration import Configuration
 from seal_friction_ros.core.foundation.compiled import has_compiler
+from seal_friction_ros.offline.bags.actuator_bag import Topics, find_topics
 from seal_friction_ros.offline.bags.bag import BagError, bag_topics
-from seal_friction_ros.offline.bags.topics import Topics, find_topics
 from seal_friction_ros.offline.replay.answer_comparison import ReplayResult
 from seal_friction_ros.offline.replay.bag_parts import Chosen, try_bags
 from seal_friction_ros.offline.replay.replay import count_messages, replay
@@ -101,15 +99,11 @@ def replay_many(
     if sum(map(_size, bags)) > _INPUT_SIZE * BULK_FROM and has_compiler():
         bulk_from, prepare = 0, partial(_compile, bags, namespace, override)
     call = partial(_verified, bulk_from=bulk_from)
-    outcomes = try_bags('replay', bags, _NAMES, call, Chosen(namespace, override=override), workers, kept, prepare)
-    return [Outcome(ReplayResult(**one.result) if one.result else None, one.error) for one in outcomes]
+    return try_bags('replay', bags, ReplayResult, call, Chosen(namespace, override=override), workers, kept, prepare)
 
 
-_NAMES = tuple(field.name for field in fields(ReplayResult))
-
-
-def _verified(bag: Path, chosen: Chosen, *, bulk_from: int) -> dict[str, Any]:
-    return asdict(verify(bag, chosen.override, chosen.namespace, bulk_from=bulk_from))
+def _verified(bag: Path, chosen: Chosen, *, bulk_from: int) -> ReplayResult:
+    return verify(bag, chosen.override, chosen.namespace, bulk_from=bulk_from)
 
 
 def _compile(bags: Sequence[Place], namespace: str, override: Configuration | None) -> None:

@@ -1,7 +1,6 @@
 """Replay of a bag through the estimator, without ROS graph or clock: byte for byte the answers of the live node."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -36,21 +35,26 @@ from seal_friction_ros.core.machine.machine_snapshot import (
 from seal_friction_ros.core.machine.message_fields import full_name
 from seal_friction_ros.core.machine.outputs import due_commands
 from seal_friction_ros.files import default_configuration, load_configuration, load_parameter_file, with_seal
-from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag, is_of_machine, open_actuator
+from seal_friction_ros.offline.bags.actuator_bag import (
+    ANSWER_TOPICS,
+    RECORDED,
+    TYPES,
+    ActuatorBag,
+    source_of,
+    topics_among,
+)
 from seal_friction_ros.offline.bags.bag import (
     CONFIGURATION_TOPIC,
     STATE_NAME,
     STATE_PERIOD,
     STATE_TYPE,
-    BagError,
     BagMessage,
     BagWriter,
     TopicInfo,
-    bag_topics,
-    read_messages,
+    message_error,
+    named,
+    read_definitions,
 )
-from seal_friction_ros.offline.bags.definitions import read_definitions
-from seal_friction_ros.offline.bags.topics import ANSWER_TOPICS, RECORDED, TYPES, find_topic, find_topics
 from seal_friction_ros.offline.replay.answer_comparison import AnswerStream, ReplayResult, replay_result
 from seal_friction_ros.offline.work.progress import progress
 
@@ -105,7 +109,7 @@ class Replay:
     """
 
     def __init__(self, bag: Path | ActuatorBag, override: Configuration | None = None, namespace: str = '') -> None:
-        self._bag, self.topics, self._read, self._namespace = _source(bag, namespace)
+        self._bag, self.topics, self._read, self._configuration, first, self._own = source_of(bag, namespace)
         """topics of the bag"""
         self.answers: dict[str, str] = {}
         """topic -> message type of all that the machine makes, in the order in which it makes them"""
@@ -118,8 +122,9 @@ class Replay:
         self.versions: set[int] = set()
         """of the algorithm that made the recorded configurations used"""
         self._override = override
-        self._configuration = find_topic(self._bag, CONFIGURATION_TYPE, self._namespace, self.topics)
-        self._state_topic = f'{(self._configuration or CONFIGURATION_TOPIC).rpartition("/")[0]}/{STATE_NAME}'
+        self.configuration = self._configuration or CONFIGURATION_TOPIC
+        """topic of the configuration in `steps`"""
+        self._state_topic = f'{self.configuration.rpartition("/")[0]}/{STATE_NAME}'
         self.kept: Collection[str] = {*self.topics, self._state_topic}
         """topics that the bag of a replay keeps, besides the answers"""
         self._topic_of: dict[tuple[str, str], str] = {}  # name of an actuator and message type -> topic
@@ -128,10 +133,9 @@ class Replay:
         self._state: MachineState | None = None
         self._tells_sending = False
         self._made: list[NamedAnswer] = []
-        first = self._first_snapshot() if self._configuration else None
         self.is_replayed = first is not None and first.is_replayed
         """whether the answers in the bag are replayed, so that they did not act"""
-        if first is None or first.file.document is None:
+        if self._own is not None:
             self._take_up(first_of_replay(override or default_configuration()))
 
     def steps(self) -> Iterator[Step]:
@@ -146,7 +150,7 @@ class Replay:
         """
         if not self._configuration:
             text = machine_text(first_of_replay(self._override or default_configuration()))
-            yield Step(BagMessage(CONFIGURATION_TOPIC, CONFIGURATION_TYPE, 0, encode_text(text)), ())
+            yield Step(BagMessage(self.configuration, CONFIGURATION_TYPE, 0, encode_text(text)), ())
         newest, due = NEVER, NEVER  # [ns] log time of the message before, and of the next state
         for message in self._read():
             if message.topic == self._state_topic:
@@ -168,36 +172,29 @@ class Replay:
         kept = {topic: topic + RECORDED for topic in guided}
         return {name if name in self.topics or self.is_replayed else topic: name for topic, name in kept.items()}
 
+    def kept_of(self, step: Step) -> Iterator[BagMessage]:
+        """What the bag of a replay keeps of a step: inputs, configuration, new answers and the force that acted."""
+        message, acted = step.message, self.acted()
+        if message.topic in acted:
+            yield message._replace(topic=acted[message.topic])
+        elif message.topic in self.kept and message.topic not in self.answers:
+            yield message
+            yield from (BagMessage(topic, kind, message.log_time, data) for topic, kind, data in step.answers)
+
     def _state_at(self, log_time: int) -> Iterator[Step]:
         if self._machine is not None and self._state is not None:
             text = encode_text(machine_text(snapshot_of(self._machine, self._state)))
             yield Step(BagMessage(self._state_topic, STATE_TYPE, log_time, text), ())
 
-    def _failed(self, message: BagMessage, error: ValueError) -> BagError:
-        return BagError(f'{self._bag}: message on {message.topic} at {message.log_time} ns: {error}')
-
-    def _first_snapshot(self) -> MachineSnapshot | None:
-        found = (message for message in self._read() if message.topic == self._configuration)
-        first = next(found, None)
-        return None if first is None else self._parsed(first)
-
-    def _parsed(self, message: BagMessage) -> MachineSnapshot:
-        try:
-            return parse_machine_text(decode_text(message.data))
-        except ValueError as error:
-            raise self._failed(message, error) from None
-
     def _configure(self, message: BagMessage) -> BagMessage:
         """Take a configuration; the message with the one that is used."""
-        snapshot = self._parsed(message)
-        self._tells_sending = snapshot.tells_sending
-        if self._override is None:
-            self.versions.add(snapshot.version)
-        used = snapshot.replayed(self._override)
-        try:
+        with named(self._bag, message):
+            snapshot = parse_machine_text(decode_text(message.data))
+            self._tells_sending = snapshot.tells_sending
+            if self._override is None:
+                self.versions.add(snapshot.version)
+            used = snapshot.replayed(self._override)
             self._take_up(used)
-        except ValueError as error:
-            raise self._failed(message, error) from None
         return message._replace(data=encode_text(machine_text(used)))
 
     def _take_up(self, snapshot: MachineSnapshot) -> None:
@@ -209,7 +206,7 @@ class Replay:
             self._plans = {**self._machine.plans, **self._ticks_and_clock(file)}
             self._topic_of = self._answers_of(file)
         else:
-            topics = find_topics(self._bag, self._namespace, self.topics)
+            topics = self._own or topics_among(self.topics, self._bag)
             inputs = {topic: kind for topic, kind in zip(topics, TYPES, strict=True) if topic in topics.inputs}
             self._machine, self._state = machine_of(snapshot, {}, inputs)
             self._plans = dict(self._machine.plans)
@@ -257,7 +254,7 @@ class Replay:
         except ValueError as error:
             if self.has_names:  # as the node: it counts the message as malformed
                 return ()
-            raise self._failed(message, error) from None
+            raise message_error(self._bag, message, error) from None
         self._made.clear()
         self._state = receive(
             self._machine, self._state, plan, record, message.log_time, self._collect, message.publish_time
@@ -281,25 +278,6 @@ class Replay:
             answers = [Answer(self._topic_of['', MACHINE_TYPE], MACHINE_TYPE, encode_together(self._made))]
         commands = due_commands(machine, state, FEEDFORWARD_TYPE in kinds, received)
         return answers + [Answer(command.topic, full_name(command.type_name), command.data) for command in commands]
-
-
-class _Source(NamedTuple):
-    """Where the messages come from."""
-
-    path: Path
-    topics: Mapping[str, TopicInfo]
-    read: Callable[[], Iterable[BagMessage]]
-    namespace: str  # of the topics that are used
-
-
-def _source(bag: Path | ActuatorBag, namespace: str) -> _Source:
-    if isinstance(bag, Path):
-        topics = bag_topics(bag)
-        names_node = not namespace or find_topic(bag, CONFIGURATION_TYPE, namespace, topics)
-        if names_node or not is_of_machine(bag, topics, None):
-            return _Source(bag, topics, partial(read_messages, bag), namespace)
-        bag = open_actuator(bag, namespace)
-    return _Source(bag.path, bag.used, bag.messages, '')
 
 
 def replay(
@@ -340,15 +318,9 @@ def _counted(steps: Iterable[Step], advance: Callable[[int], None]) -> Iterator[
 
 
 def _written(steps: Iterable[Step], replayed: Replay, writer: BagWriter) -> Iterator[Step]:
-    """Write inputs, configuration and new answers, and the recorded feed-forward that acted on a topic of its own."""
     for step in steps:
-        message, acted = step.message, replayed.acted()
-        if message.topic in acted:
-            writer.write(*message._replace(topic=acted[message.topic]))
-        elif message.topic in replayed.kept and message.topic not in replayed.answers:
-            log_time = writer.write(*message)
-            for answer in step.answers:
-                writer.write(answer.topic, answer.type_name, log_time, answer.data)
+        for message in replayed.kept_of(step):
+            writer.write(*message)
         yield step
 
 

@@ -7,19 +7,17 @@ lack, not even the last one of a stretch. In any other case nothing is concluded
 go, which finds the first difference.
 """
 
-from dataclasses import asdict
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 from seal_friction_ros.core.estimation.configuration import ALGORITHM_VERSION, Snapshot, parse_snapshot, snapshot_text
 from seal_friction_ros.core.estimation.message_blocks import Kind, UnsuitedError
 from seal_friction_ros.core.estimation.messages import decode_text
 from seal_friction_ros.files import default_configuration
+from seal_friction_ros.offline.bags.actuator_bag import Topics
 from seal_friction_ros.offline.bags.block_reader import Stretch, read_in_bulk, times_of
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS, LAST_TIME
-from seal_friction_ros.offline.bags.topics import Topics
 from seal_friction_ros.offline.replay.answer_comparison import ReplayResult
 from seal_friction_ros.offline.replay.compiled_replay import Run, compile_now, first_configurations, kinds_of_topics
 from seal_friction_ros.offline.work.cluster import Cluster
@@ -63,8 +61,7 @@ def verify_stretches(bag: Path, topics: Topics, workers: Workers) -> ReplayResul
     calls = [partial(_verified, bag.absolute(), topics, stretch) for stretch in stretches]
     label = f'replay {bag.name} in {len(calls)} stretches'
     outcomes = try_all(label, calls, workers, prepare=lambda: compile_now(first_configurations([bag], '', None)))
-    results = [ReplayResult(**outcome.result) if outcome.result else None for outcome in outcomes]
-    found = [result for result in results if result is not None]
+    found = [outcome.result for outcome in outcomes if outcome.result is not None]
     if len(found) < len(stretches):
         return None
     return ReplayResult(
@@ -77,8 +74,8 @@ def verify_stretches(bag: Path, topics: Topics, workers: Workers) -> ReplayResul
     )
 
 
-def _verified(bag: Path, topics: Topics, stretch: Stretch) -> dict[str, Any] | None:
-    """Result of a stretch as a mapping; None if it is not identical, or does not end in the recorded state."""
+def _verified(bag: Path, topics: Topics, stretch: Stretch) -> ReplayResult | None:
+    """Result of a stretch; None if it is not identical, or does not end in the recorded state."""
     kind_of = kinds_of_topics(topics)
     try:
         run = Run(default_configuration())
@@ -97,7 +94,7 @@ def _verified(bag: Path, topics: Topics, stretch: Stretch) -> dict[str, Any] | N
                 return None
     except (UnsuitedError, OSError, *ERRORS):
         return None
-    return asdict(result)
+    return result
 
 
 def _state_at(bag: Path, topics: Topics, file: int, time: int) -> str:

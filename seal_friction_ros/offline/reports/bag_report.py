@@ -13,7 +13,7 @@ from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.foundation.documents import parse_json
 from seal_friction_ros.core.foundation.parameters import Meaning, meanings
 from seal_friction_ros.core.foundation.units import BAR, MM, MS, UM
-from seal_friction_ros.offline.bags.actuator_bag import MappingFile
+from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun, read_run
 from seal_friction_ros.offline.reports import bag_evaluation, tracking_evaluation, verdicts
 from seal_friction_ros.offline.reports.bag_evaluation import BagEvaluation, PressureLevel

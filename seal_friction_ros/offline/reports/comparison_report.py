@@ -13,7 +13,7 @@ from seal_friction_ros.core.foundation.units import BAR, MM
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.files import config_path, read_yaml
-from seal_friction_ros.offline.bags.actuator_bag import MappingFile
+from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun, read_run
 from seal_friction_ros.offline.reports import bag_evaluation, tracking_evaluation, verdicts
 from seal_friction_ros.offline.reports import figure_style as style

@@ -1,88 +1,84 @@
 """Command of a controller in a bag, and the gain from force to command (`core.tuning.output_gain`)."""
 
-import math
-import struct
-from pathlib import Path
-from typing import Any
+from functools import partial
 
 import numpy as np
 
-from seal_friction_ros.core.estimation import messages
-from seal_friction_ros.core.estimation.records import Position, Pressure, Velocity
+from seal_friction_ros.core.machine.message_fields import Reader
 from seal_friction_ros.core.tuning.output_gain import CommandRecord, OutputGain, output_gain
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings
-from seal_friction_ros.offline.bags.actuator_bag import MappingFile, open_actuator
-from seal_friction_ros.offline.bags.bag import BagError
+from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag
+from seal_friction_ros.offline.bags.bag import BagError, read_definitions
+from seal_friction_ros.offline.bags.columns import (
+    Block,
+    Held,
+    Numbers,
+    Wanted,
+    collected,
+    extend,
+    growing,
+    wanted_of,
+)
 
 NUMBER, NUMBERS = 'std_msgs/msg/Float64', 'std_msgs/msg/Float64MultiArray'
-_HEADER = b'\x00\x01'  # CDR, little endian
+_FIELDS = {NUMBER: 'data', NUMBERS: 'data[0]'}
+_HELD = {'command': 1, 'pressure': 2, 'position': 1}
 
 
-def first_number(type_name: str, data: bytes) -> float:
-    """Value of a `std_msgs/Float64`, or the first value of a `std_msgs/Float64MultiArray` without a layout.
+class _CommandCollector:
+    """Each velocity sample with the newest command, pressures and position before it."""
 
-    Raises:
-        ValueError: The message is malformed, empty, or has a layout.
-    """
-    try:
-        if data[:2] != _HEADER:
-            raise ValueError('not little-endian CDR')
-        if type_name == NUMBER:
-            return float(struct.unpack_from('<d', data, 4)[0])
-        dimensions, _offset, length = struct.unpack_from('<III', data, 4)
-        if dimensions or not length:
-            raise ValueError('the array is empty or has a layout')
-        return float(struct.unpack_from('<d', data, 4 + 16)[0])  # aligned to 8 bytes after the header
-    except struct.error as error:
-        raise ValueError(f'malformed: {error}') from None
+    def __init__(self, reader: Reader) -> None:
+        self._reader = reader
+        self._held = Held(_HELD)
+        self.columns = growing(2 + sum(_HELD.values()))
+
+    def add(self, block: Block) -> None:
+        """Take one block."""
+        commands = [(place, number) for place, _, number in block.decoded('command', self._number)]
+        places, numbers = np.array(commands).reshape(-1, 2).T
+        found = {name: block.of(name) for name in ('pressure', 'position')}
+        found['command'] = Numbers(places.astype(np.int64), places.astype(np.int64), numbers[np.newaxis])
+        velocities = block.of('velocity')
+        held = self._held.at(velocities.places, found)
+        extend(self.columns, np.array([velocities.stamps * 1e-9, velocities.numbers[0], *held]))
+
+    def _number(self, data: bytes) -> float:
+        """The command of a message.
+
+        Raises:
+            ValueError: The message is malformed or empty.
+        """
+        (number,) = self._reader.read(data).numbers
+        if number is None:
+            raise ValueError('the array is empty')
+        return number
 
 
-def read_output_gain(
-    bag: Path,
-    topic: str,
-    known: RecordedAxisSettings,
-    namespace: str = '',
-    mapping: MappingFile | None = None,
-) -> OutputGain:
+def read_output_gain(source: ActuatorBag, topic: str, known: RecordedAxisSettings) -> OutputGain:
     """Gain from force to the command on a topic.
 
-    Each velocity sample takes the newest command, pressures and position.
-
     Args:
-        bag: Command, pressures, velocity and, if measured, position.
+        source: Command, pressures, velocity and, if measured, position.
         topic: Topic of the command, a `std_msgs/Float64` or `Float64MultiArray`.
         known: Areas of both chambers.
-        namespace: As of `open_actuator`.
-        mapping: Likewise.
 
     Raises:
         BagError: The bag lacks something, or cannot tell the gain.
     """
     if not (known.area_a and known.area_b):
         raise BagError(f'{topic}: give --area-a and --area-b [m2]: the gain needs the force of the pressures')
-    source = open_actuator(bag, namespace, mapping)
-    found = source.infos.get(topic)
-    if found is None or found.type_name not in (NUMBER, NUMBERS):
-        what = 'is not in it' if found is None else f'is {found.type_name}'
+    bag = source.path
+    kind = source.infos[topic].type_name if topic in source.infos else ''
+    if kind not in _FIELDS:
+        what = f'is {kind}' if kind else 'is not in it'
         raise BagError(f'{bag}: the command {topic} {what}: it has to be {NUMBER} or {NUMBERS}')
-    held: dict[str, Any] = {}
-    command, rows = math.nan, []
-    for message in source.messages():
-        if message.topic == topic:
-            try:
-                command = first_number(message.type_name, message.data)
-            except ValueError as error:
-                raise BagError(f'{bag}: {topic}: {error}') from None
-        elif message.topic in source.topics:
-            sample = messages.DECODERS[message.type_name](message.data)
-            held[type(sample).__name__] = sample
-            pressure: Pressure | None = held.get('Pressure')
-            position: Position | None = held.get('Position')
-            if isinstance(sample, Velocity) and pressure is not None and math.isfinite(command):
-                force = known.area_a * pressure.chamber_a - known.area_b * pressure.chamber_b
-                place = position.position if position is not None else math.nan
-                rows.append((sample.stamp * 1e-9, command, force, place, sample.velocity))
+    (definition,) = read_definitions(bag, [kind]).values()
+    reader = Reader(definition, kind, [_FIELDS[kind]])
+    wanted = {**wanted_of(source, ('velocity', 'pressure', 'position')), 'command': Wanted(topic, kind)}
+    columns = np.array(collected(source, wanted, partial(_CommandCollector, reader)).columns)
+    time, velocity, command, a, b, position = columns[:, np.isfinite(columns[2:5]).all(axis=0)]
     try:
-        return output_gain(CommandRecord(*np.array(rows).reshape(-1, 5).T))
+        return output_gain(CommandRecord(time, command, known.area_a * a - known.area_b * b, position, velocity))
     except ValueError as error:
         raise BagError(f'{bag}: {topic}: {error}') from None

@@ -5,7 +5,7 @@ axis gives the same bytes.
 """
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,25 +13,22 @@ from typing import Any, NamedTuple
 import numpy as np
 import yaml
 
-from seal_friction_ros.core.estimation import messages
 from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING, Configuration, parse_snapshot
-from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
-from seal_friction_ros.core.estimation.node_options import FEEDFORWARD_PREFIX
-from seal_friction_ros.core.estimation.pipeline import NO_REFERENCE, Reference, condition_reference, is_possible
-from seal_friction_ros.core.estimation.records import (
-    NO_PRESSURE,
-    Force,
-    FrictionEstimate,
-    Position,
-    Pressure,
-    ServoReference,
-    Velocity,
+from seal_friction_ros.core.estimation.messages import (
+    ESTIMATE_TYPE,
+    FEEDFORWARD_TYPE,
+    FORCE_TYPE,
+    PRESSURE_TYPE,
+    REFERENCE_TYPE,
 )
-from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.estimation.node_options import FEEDFORWARD_PREFIX
+from seal_friction_ros.core.estimation.pipeline import NO_REFERENCE, condition_reference, is_possible
+from seal_friction_ros.core.estimation.records import ServoReference
+from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.parameters import meanings
 from seal_friction_ros.core.foundation.units import MM, MS, UM
-from seal_friction_ros.core.friction.force_sum_correction import corrected_force_sum
 from seal_friction_ros.core.servo.closed_loop import IDEAL_SENSORS, Axis, AxisSensors
 from seal_friction_ros.core.servo.sensors import SensorSettings
 from seal_friction_ros.core.servo.simulator_options import (
@@ -43,7 +40,7 @@ from seal_friction_ros.core.servo.simulator_options import (
 )
 from seal_friction_ros.core.servo.tracking import tracking_peak, tracking_rms
 from seal_friction_ros.core.tuning.other_plants import PlantOutcome, on_plants
-from seal_friction_ros.core.tuning.recorded_axis import RecordedMotion, RecordedTuning, Recording, tune_recorded_axis
+from seal_friction_ros.core.tuning.recorded_axis import RecordedTuning, Recording, tune_recorded_axis
 from seal_friction_ros.core.tuning.settings import (
     FORCE_MARGIN,
     RecordedAxisSettings,
@@ -52,8 +49,10 @@ from seal_friction_ros.core.tuning.settings import (
 )
 from seal_friction_ros.core.tuning.simulated_axis import MOST_CANDIDATES, Tuning, TuningProblem, tune
 from seal_friction_ros.files import default_configuration, read_parameters
-from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag, MappingFile, open_actuator
+from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag
 from seal_friction_ros.offline.bags.bag import BagError
+from seal_friction_ros.offline.bags.columns import Block, Numbers, collected
+from seal_friction_ros.offline.bags.recorded_run import RunCollector, wanted_of_run
 from seal_friction_ros.offline.replay.replay import Replay
 from seal_friction_ros.offline.work.atomic_file import write_whole
 from seal_friction_ros.offline.work.progress import progress
@@ -290,32 +289,25 @@ def tune_simulator(
 
 
 def tune_bag(
-    bag: Path,
-    known: RecordedAxisSettings,
-    configuration: Configuration | None = None,
-    namespace: str = '',
-    mapping: MappingFile | None = None,
+    actuator: ActuatorBag, known: RecordedAxisSettings, configuration: Configuration | None = None
 ) -> BagTuning:
     """Find the feed-forward that matches the friction in a bag of a real axis.
 
     Args:
-        bag: Pressure, velocity, force sum and reference; the estimates are computed anew.
+        actuator: Pressure, velocity, force sum and reference; the estimates are computed anew.
         known: Known properties of the axis.
         configuration: Seals, estimator and feed-forward instead of those in the bag.
-        namespace: As of `open_actuator`.
-        mapping: Likewise.
 
     Raises:
         BagError: The bag cannot be read, or an input is missing in it.
     """
-    actuator = open_actuator(bag, namespace, mapping)
     recording, track, recorded = read_recording(actuator, configuration)
     try:
         found = tune_recorded_axis(recording, recorded.feedforward, known)
     except ValueError as error:
-        raise BagError(f'{bag}: {error}') from None
+        raise BagError(f'{actuator.path}: {error}') from None
     tuned = tuple(parameter for parameter, is_identified in found.identified.items() if is_identified)
-    motion = f'{len(recording.estimates)} samples, {recording.time[-1]:.3f} s'
+    motion = f'{len(recording.stamps)} samples, {recording.time[-1]:.3f} s'
     name = actuator.name
     task = TuningTask(
         f'bag {name}', motion, _seals_text(recorded), recorded.feedforward, tuned, recorded.has_placeholder
@@ -347,62 +339,76 @@ def read_recording(
     """
     topics, bag = actuator.topics, actuator.path
     needed = {
-        messages.REFERENCE_TYPE: (topics.reference, 'the feed-forward is computed from the reference'),
-        messages.FORCE_TYPE: (topics.force, 'the friction is computed from the force sum'),
-        messages.PRESSURE_TYPE: (topics.pressure, 'the friction depends on the pressure'),
+        REFERENCE_TYPE: (topics.reference, 'the feed-forward is computed from the reference'),
+        FORCE_TYPE: (topics.force, 'the friction is computed from the force sum'),
+        PRESSURE_TYPE: (topics.pressure, 'the friction depends on the pressure'),
     }
     for type_name, (topic, reason) in needed.items():
         if not topic:
             raise BagError(f'{bag}: no message of {type_name} in it, but {reason}: record this topic too')
-    configuration = override or default_configuration()
-    estimator = configuration.parameters().estimator
-    held: dict[type, Any] = {Force: Force(0, np.nan), Position: Position(0, np.nan)}
-    estimates: list[FrictionEstimate] = []
-    conditioned = NO_REFERENCE
-    motions, rows = [], []
-    with progress(f'read {bag.name}', actuator.total) as advance:
-        for count, step in enumerate(Replay(actuator, override).steps(), start=1):
-            if count % 1000 == 0:
-                advance(1000)
-            message = step.message
-            if message.type_name == messages.CONFIGURATION_TYPE:
-                configuration = parse_snapshot(messages.decode_text(message.data)).configuration
-                estimator = configuration.parameters().estimator
-                continue
-            if message.topic not in topics:
-                continue
-            sample = messages.DECODERS[message.type_name](message.data)
-            held[type(sample)] = sample
-            conditioned = _with_reference(estimator.settings, conditioned, sample)
-            reference = held.get(ServoReference)
-            if not isinstance(sample, Velocity) or reference is None:
-                continue
-            if not estimates or sample.stamp > estimates[-1].stamp:
-                (data,) = (one.data for one in step.answers if one.type_name == messages.ESTIMATE_TYPE)
-                estimates.append(messages.decode(messages.ESTIMATE_TYPE, data))
-                age = (sample.stamp - reference.stamp) * 1e-9
-                given = conditioned.velocity
-                motions.append(RecordedMotion(given.velocity, conditioned.acceleration, sample.velocity, age))
-                force_sum = _force_sum(estimator, held[Force], held.get(Pressure, NO_PRESSURE))
-                rows.append((force_sum, reference.position, held[Position].position))
-    if len(estimates) < 2:
-        raise BagError(f'{bag}: fewer than two velocity samples after the first reference')
-    force, *track = np.array(rows).T
-    return Recording(estimates, motions, force), RecordedTrack(*track), configuration
+    replayed = Replay(actuator, override)
+    answers = {_FIELDS[kind]: topic for topic, kind in replayed.answers.items()}
+    source = actuator._replace(topics=topics._replace(configuration=replayed.configuration, **answers))
+    kept = (message for step in replayed.steps() for message in replayed.kept_of(step))
+    axis = collected(source, wanted_of_run(source), _AxisCollector, messages=kept)
+    return axis.recording(source)
 
 
-def _force_sum(estimator: EstimatorParameters, force: Force, pressure: Pressure) -> float:
-    """Force sum [N] as the estimator uses it."""
-    if not estimator.corrects_force_sum:
-        return force.force
-    correction = estimator.force_sum_correction
-    return float(corrected_force_sum(correction, force.force, pressure.chamber_a, pressure.chamber_b))
+class _AxisCollector(RunCollector):
+    """Keeps the references, too."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._references: list[tuple[Numbers, IntArray]] = []  # with the number of estimates before each
+
+    def add(self, block: Block) -> None:
+        """Take one block."""
+        references = block.of('reference')
+        before = len(self.stamps) + np.searchsorted(block.of('estimate').places, references.places)
+        self._references.append((references, before))
+        super().add(block)
+
+    def recording(self, source: ActuatorBag) -> tuple[Recording, RecordedTrack, Configuration]:
+        """All samples from the first reference on.
+
+        Raises:
+            BagError: There are fewer than two.
+        """
+        own = np.frombuffer(self.stamps, np.int64)
+        before = np.concatenate([places for _, places in self._references])
+        newest = np.searchsorted(before, np.arange(len(own)), side='right') - 1
+        chosen = np.flatnonzero(newest >= 0)
+        chosen = chosen[np.diff(np.maximum.accumulate(own[chosen]), prepend=own[chosen][:1] - 1) > 0]
+        if len(chosen) < 2:
+            raise BagError(f'{source.path}: fewer than two velocity samples after the first reference')
+        run, reference = self.run(source), newest[chosen]
+        configuration = parse_snapshot(run.configurations[-1][1]).configuration
+        stamps, moved = _conditioned(configuration.settings, [numbers for numbers, _ in self._references])
+        recording = Recording(
+            stamps=own[chosen],
+            **{name: getattr(run, name)[chosen] for name in _OF_RUN},
+            reference_velocity=moved[0, reference],
+            reference_acceleration=moved[1, reference],
+            reference_age=np.asarray((own[chosen] - stamps[reference]) * 1e-9, np.float64),
+        )
+        return recording, RecordedTrack(run.reference[chosen], run.position[chosen]), configuration
 
 
-def _with_reference(settings: EstimatorSettings, conditioned: Reference, sample: Any) -> Reference:
-    """What the node keeps of the references, after one more sample of any kind."""
-    is_new = isinstance(sample, ServoReference) and is_possible(settings, sample)
-    return condition_reference(conditioned, sample) if is_new else conditioned
+_FIELDS = {ESTIMATE_TYPE: 'estimate', FEEDFORWARD_TYPE: 'feedforward'}
+_OF_RUN = ('state', 'status', 'coulomb_friction', 'velocity', 'force_sum')
+
+
+def _conditioned(settings: EstimatorSettings, references: Sequence[Numbers]) -> tuple[IntArray, FloatArray]:
+    """Stamps of the references [ns], and what the node keeps after each: velocity and acceleration, shape (2, n)."""
+    stamps = np.concatenate([part.stamps for part in references])
+    numbers = np.concatenate([part.numbers for part in references], axis=1)
+    conditioned, moved = NO_REFERENCE, []
+    for stamp, values in zip(stamps.tolist(), numbers.T.tolist(), strict=True):
+        wanted = ServoReference(stamp, *values)
+        if is_possible(settings, wanted):
+            conditioned = condition_reference(conditioned, wanted)
+        moved.append((conditioned.velocity.velocity, conditioned.acceleration))
+    return stamps, np.array(moved).reshape(-1, 2).T
 
 
 # -- parameter file ---------------------------------------------------------------------------------------------------

@@ -23,7 +23,7 @@ from seal_friction_ros.core.machine.message_fields import (
     parse_definition,
     short_name,
 )
-from seal_friction_ros.offline.bags.bag import message_definition
+from seal_friction_ros.offline.bags.definitions import message_definition
 
 INSTALLED = (
     'seal_friction_msgs/msg/RodVelocity',

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 from harness.compensation import COMPENSATING
 
-from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
+from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.tuning.recorded_axis import (
     RecordedLaw,
-    RecordedMotion,
     Recording,
     acceleration,
     delayed,
@@ -44,15 +43,18 @@ def recording(
     direction = np.tanh(velocity / width) if width else np.sign(velocity)
     force = scale * pressure_part * direction + mass * slope + offset
     force = force + noise * np.random.default_rng(5).normal(size=len(TIME))
-    estimates = [
-        FrictionEstimate(
-            round(t * 1e9), c, 3.0, c + 5.0, 0.0, FrictionState.SLIDING if abs(v) > 1e-3 else FrictionState.STUCK,
-            int(np.sign(v)), status, 0.0,
-        )
-        for t, c, v in zip(TIME, pressure_part, velocity, strict=True)
-    ]  # fmt: skip
-    motions = [RecordedMotion(float(v), float(a), float(v)) for v, a in zip(velocity, slope, strict=True)]
-    return Recording(tuple(estimates), tuple(motions), force)
+    state = np.where(np.abs(velocity) > 1e-3, int(FrictionState.SLIDING), int(FrictionState.STUCK))
+    return Recording(
+        stamps=np.round(TIME * 1e9).astype(np.int64),
+        state=state,
+        status=np.full(len(TIME), status),
+        coulomb_friction=pressure_part,
+        velocity=velocity,
+        force_sum=force,
+        reference_velocity=velocity,
+        reference_acceleration=slope,
+        reference_age=np.zeros(len(TIME)),
+    )
 
 
 def test_scale_mass_and_offset_come_back():
@@ -77,7 +79,7 @@ def test_stated_deviation_is_that_of_the_scale():
 @pytest.mark.parametrize(('age', 'usable'), [(0.029, True), (0.031, False), (-0.029, True), (-0.031, False)])
 def test_a_reference_counts_within_its_timeout_before_and_after_the_sample(age, usable):
     made = recording()
-    aged = made._replace(motions=[motion._replace(reference_age=age) for motion in made.motions])
+    aged = made._replace(reference_age=np.full(len(TIME), age))
     assert bool(np.any(feedforward_force(SETTINGS, aged)[500:])) is usable
 
 
@@ -145,9 +147,7 @@ def test_a_sample_that_is_half_a_period_early_or_late_has_no_acceleration(stretc
 
 def only(made, keep):
     """The recording with the estimates outside ``keep`` unusable."""
-    bad = int(Status.PRESSURE_STALE)
-    estimates = [e if k else e._replace(status=bad) for e, k in zip(made.estimates, keep, strict=True)]
-    return made._replace(estimates=estimates)
+    return made._replace(status=np.where(keep, made.status, int(Status.PRESSURE_STALE)))
 
 
 def test_a_doubtful_motion_counts_from_a_tenth_of_the_largest_speed_on():
@@ -314,13 +314,8 @@ def test_force_limit_falls_with_the_friction_and_a_peak_of_noise_does_not_raise_
 def test_time_counts_from_the_first_sample_to_the_nanosecond_with_stamps_since_1970():
     made = recording()
     start = 1_700_000_000_123_456_789  # [ns]
-    later = made._replace(estimates=[e._replace(stamp=e.stamp + start) for e in made.estimates])
+    later = made._replace(stamps=made.stamps + start)
     np.testing.assert_allclose(later.time, TIME, rtol=0.0, atol=1e-12)
-    np.testing.assert_array_equal(later.coulomb_friction, made.coulomb_friction)
-
-
-def test_a_motion_without_measurements_is_that_of_the_reference_at_this_moment():
-    assert RecordedMotion(0.1) == (0.1, 0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize('count', [9, 10, 11, 12])
@@ -386,10 +381,15 @@ def shuttle(speed, friction=20.0, noise=0.0, slow=0):
     number = np.arange(len(TIME))
     velocity = np.where(number // 250 % 2, -speed, speed)
     velocity = np.where(number % 100 >= slow, velocity, 1e-9 * np.sign(velocity))
-    estimates = [e._replace(coulomb_friction=friction, state=FrictionState.SLIDING) for e in made.estimates]
-    motions = [RecordedMotion(float(v), 0.0, float(v)) for v in velocity]
     scatter = noise * np.where(np.arange(len(TIME)) // 2 % 2, -1.0, 1.0)
-    return made._replace(estimates=estimates, motions=motions, force_sum=friction * np.sign(velocity) + scatter)
+    return made._replace(
+        coulomb_friction=np.full(len(TIME), friction),
+        state=np.full(len(TIME), int(FrictionState.SLIDING)),
+        velocity=velocity,
+        reference_velocity=velocity,
+        reference_acceleration=np.zeros(len(TIME)),
+        force_sum=friction * np.sign(velocity) + scatter,
+    )
 
 
 def smoothing(made):
@@ -431,8 +431,7 @@ def test_a_recording_that_is_mostly_noise_leaves_smoothing_and_slew_limit():
 def test_the_next_lower_slew_limit_costs_more_than_a_twentieth_of_the_force():
     made = recording()
     often = np.repeat(np.arange(len(TIME)), np.where(np.arange(len(TIME)) % 50 == 0, 2, 1))  # stamps that come twice
-    rows = {name: [getattr(made, name)[i] for i in often] for name in ('estimates', 'motions')}
-    twice = made._replace(**rows, force_sum=made.force_sum[often])
+    twice = Recording(*(column[often] for column in made))
     for each in (made, twice):
         found = tune_recorded_axis(each, SETTINGS, KNOWN).feedforward
         free = feedforward_force(dataclasses.replace(found, slew_limit=1e9), each)
@@ -444,13 +443,13 @@ def test_the_next_lower_slew_limit_costs_more_than_a_twentieth_of_the_force():
 
 def test_a_reference_that_is_always_late_tells_no_slew_limit():
     made = recording()
-    late = made._replace(motions=[motion._replace(reference_age=1.0) for motion in made.motions])
+    late = made._replace(reference_age=np.ones(len(TIME)))
     assert not tune_recorded_axis(late, SETTINGS, KNOWN).identified['slew_limit']
 
 
 def test_a_force_by_the_measured_velocity_does_not_follow_the_reference():
     made = recording()
-    backwards = made._replace(motions=[m._replace(measured_velocity=-m.measured_velocity) for m in made.motions])
+    backwards = made._replace(velocity=-made.velocity)
     settings = dataclasses.replace(SETTINGS, use_measured_velocity=True, lead_time=0.0)
     by_reference = dataclasses.replace(settings, use_measured_velocity=False)
     assert np.abs(feedforward_force(settings, backwards)).max() > 30.0

@@ -24,9 +24,9 @@ from seal_friction_ros.offline.bags.bag import (
     BagError,
     BagWriter,
     bag_topics,
-    message_definition,
     read_messages,
 )
+from seal_friction_ros.offline.bags.definitions import message_definition
 from seal_friction_ros.offline.bags.recover import recover
 from seal_friction_ros.offline.replay.replay import replay
 

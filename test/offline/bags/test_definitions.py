@@ -8,8 +8,7 @@ import pytest
 from mcap.writer import Writer
 
 from seal_friction_ros.core.machine.message_fields import Field
-from seal_friction_ros.offline.bags.bag import BagError
-from seal_friction_ros.offline.bags.definitions import read_definitions
+from seal_friction_ros.offline.bags.bag import BagError, read_definitions
 
 NOT_INSTALLED = 'nav_msgs/Odometry'
 

@@ -14,6 +14,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.bags import mcap_reader
+from seal_friction_ros.offline.bags.definitions import message_definition
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.replay.replay import replay
 
@@ -33,7 +34,7 @@ def in_the_format(recorded: Path, out: Path, form: str, mode: str) -> Path:
     with writer:
         connections = {
             topic: writer.add_connection(
-                topic, info.type_name, msgdef=(definition := b.message_definition(info.type_name))[0],
+                topic, info.type_name, msgdef=(definition := message_definition(info.type_name))[0],
                 rihs01=definition[1], typestore=get_typestore(Stores.EMPTY),
             )
             for topic, info in b.bag_topics(recorded).items()
@@ -64,7 +65,7 @@ def test_a_bag_with_chunks_of_any_compression_replays_and_verifies(recorded, com
         writer.start('ros2')
         channels = {}
         for topic, info in b.bag_topics(recorded).items():
-            schema = writer.register_schema(info.type_name, 'ros2msg', b.message_definition(info.type_name)[0].encode())
+            schema = writer.register_schema(info.type_name, 'ros2msg', message_definition(info.type_name)[0].encode())
             channels[topic] = writer.register_channel(topic, 'cdr', schema)
         for message in b.read_messages(recorded):
             writer.add_message(channels[message.topic], message.log_time, message.data, message.log_time)

@@ -11,10 +11,10 @@ from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.temperature import std_of_unknown
 from seal_friction_ros.files import read_yaml
+from seal_friction_ros.offline.bags.actuator_bag import find_topics
 from seal_friction_ros.offline.bags.bag import BagWriter, read_messages
 from seal_friction_ros.offline.bags.import_log import import_log, read_samples
 from seal_friction_ros.offline.bags.rig_file import read_rig
-from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.replay.compiled_replay import replay_in_bulk
 from seal_friction_ros.offline.replay.replay import chosen_configuration, replay

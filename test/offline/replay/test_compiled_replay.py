@@ -31,6 +31,7 @@ from seal_friction_ros.core.estimation.messages import (
     VELOCITY_TYPE,
 )
 from seal_friction_ros.files import load_configuration
+from seal_friction_ros.offline.bags.actuator_bag import find_topics
 from seal_friction_ros.offline.bags.bag import (
     ESTIMATE_TOPIC,
     FEEDFORWARD_TOPIC,
@@ -38,12 +39,11 @@ from seal_friction_ros.offline.bags.bag import (
     BagMessage,
     BagWriter,
     bag_topics,
-    message_definition,
     read_messages,
 )
 from seal_friction_ros.offline.bags.block_reader import read_in_bulk
+from seal_friction_ros.offline.bags.definitions import message_definition
 from seal_friction_ros.offline.bags.mcap_reader import MAGIC
-from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.replay import compiled_replay
 from seal_friction_ros.offline.replay.answer_comparison import ReplayResult
 from seal_friction_ros.offline.replay.parallel_replay import BULK_FROM, verify

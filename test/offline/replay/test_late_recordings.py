@@ -23,9 +23,8 @@ from seal_friction_ros.core.estimation.messages import (
 from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.core.machine import machine as m
 from seal_friction_ros.core.machine.machine_snapshot import machine_text, snapshot_of
-from seal_friction_ros.offline.bags.actuator_bag import open_actuator
+from seal_friction_ros.offline.bags.actuator_bag import find_topics, open_actuator
 from seal_friction_ros.offline.bags.bag import BagMessage, BagWriter, read_messages
-from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.replay.compiled_replay import replay_in_bulk
 from seal_friction_ros.offline.replay.replay import Replay, replay
 

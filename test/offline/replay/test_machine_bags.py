@@ -18,9 +18,9 @@ from seal_friction_ros.core.estimation.messages import (
 )
 from seal_friction_ros.core.machine import machine as m
 from seal_friction_ros.core.machine.machine_snapshot import machine_text, parse_machine_text, snapshot_of
+from seal_friction_ros.offline.bags.actuator_bag import RECORDED
 from seal_friction_ros.offline.bags.bag import STATE_TYPE, BagMessage, BagWriter, read_messages
 from seal_friction_ros.offline.bags.info import bag_info
-from seal_friction_ros.offline.bags.topics import RECORDED
 from seal_friction_ros.offline.replay.replay import chosen_configuration, replay
 
 MS = 1_000_000  # [ns]

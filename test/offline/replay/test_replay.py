@@ -18,8 +18,8 @@ from seal_friction_ros.core.estimation.messages import (
     encode_text,
 )
 from seal_friction_ros.core.estimation.records import Status
+from seal_friction_ros.offline.bags.actuator_bag import find_topics
 from seal_friction_ros.offline.bags.bag import ESTIMATE_TOPIC, BagError, BagMessage, BagWriter, read_messages
-from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.replay.parallel_replay import verify
 from seal_friction_ros.offline.replay.replay import chosen_configuration, replay
 

@@ -21,6 +21,7 @@ from seal_friction_ros.core.estimation.messages import (
     decode_text,
     encode_text,
 )
+from seal_friction_ros.offline.bags.actuator_bag import find_topics
 from seal_friction_ros.offline.bags.bag import (
     STATE_TYPE,
     BagMessage,
@@ -31,7 +32,6 @@ from seal_friction_ros.offline.bags.bag import (
 )
 from seal_friction_ros.offline.bags.block_reader import Stretch, read_in_bulk, times_of
 from seal_friction_ros.offline.bags.mcap_reader import LAST_TIME
-from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.replay import parallel_replay, shared_replay
 from seal_friction_ros.offline.replay import replay as replay_module

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from harness.compensation import compensating
+from harness.example_bags import rewrite
 from harness.report_page import checked_page
 
 from seal_friction_ros.core.estimation.configuration import Configuration, first_snapshot, snapshot_text
@@ -245,10 +246,21 @@ def test_given_mass_and_delay_are_used(axis: Path, tmp_path: Path, capsys):
 
 def test_recording_has_the_inputs_of_the_pipeline(axis: Path):
     recording, track, configuration = read_recording(open_actuator(axis))
-    assert len(recording.estimates) == len(track.position) == 2000
-    assert recording.motions[50].reference_velocity == Sine().at(0.05).velocity
+    assert len(recording.stamps) == len(track.position) == 2000
+    assert recording.reference_velocity[50] == Sine().at(0.05).velocity
     assert np.isfinite(recording.force_sum).all()
     assert configuration == compensating()
+
+
+def test_a_velocity_that_no_rod_has_is_no_sample_of_the_recording(axis: Path, tmp_path: Path):
+    times = [one.log_time for one in b.read_messages(axis) if one.type_name == VELOCITY_TYPE]
+
+    def at_half(_: int, one: b.BagMessage) -> b.BagMessage:
+        is_chosen = one.type_name == VELOCITY_TYPE and one.log_time == times[1000]
+        return one._replace(data=encode(Velocity(1000 * 1_000_000, 99.0, b'rod'))) if is_chosen else one
+
+    recording, _, _ = read_recording(open_actuator(rewrite(axis, tmp_path / 'bag', at_half)))
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(recording.velocity)), [1000])
 
 
 @pytest.mark.long

@@ -16,7 +16,7 @@ from harness.dask_cluster import ENVIRONMENT, DaskCluster, begun, dask_cluster, 
 from harness.example_bags import write_inputs, write_recorded
 from paths import ROOT
 
-from seal_friction_ros.offline.bags.topics import find_topics
+from seal_friction_ros.offline.bags.actuator_bag import find_topics
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.replay import replay as replay_module
 from seal_friction_ros.offline.replay.replay import replay
