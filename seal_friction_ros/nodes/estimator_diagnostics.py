@@ -9,7 +9,7 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from seal_friction_ros.core.estimation.adaptation import AdaptationState
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorState
 from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
-from seal_friction_ros.core.estimation.messages import CLOCK_TOPIC, INPUTS
+from seal_friction_ros.core.estimation.messages import CLOCK_TOPIC, INPUTS, Output
 from seal_friction_ros.core.estimation.pipeline import Turn
 from seal_friction_ros.core.estimation.records import NEVER, NO_ESTIMATE, FrictionEstimate, Status
 from seal_friction_ros.core.estimation.seal_health import (
@@ -21,7 +21,6 @@ from seal_friction_ros.core.estimation.seal_health import (
     with_sample,
 )
 from seal_friction_ros.core.estimation.swings import NO_SWING, Swing
-from seal_friction_ros.core.machine.answers_together import NamedAnswer
 from seal_friction_ros.nodes.graph_watch import GraphFindings
 
 _SHORTEST_SILENCE = 0.9  # [s] in a shorter interval, no estimate means no fault if the interval before had one
@@ -197,10 +196,10 @@ class EstimatorDiagnostics:
         self._newest[FeedForward] = feedforward
         self._limited |= feedforward.limited
 
-    def take_newest(self, actuator: str) -> list[NamedAnswer]:
+    def take_newest(self) -> list[Output]:
         """The newest answers since the last call, for who looks on: each with the bits of all answers since then."""
         bits = {FrictionEstimate: {'status': self._status}, FeedForward: {'limited': self._limited}}
-        found = [NamedAnswer(actuator, answer._replace(**bits[kind]), b'') for kind, answer in self._newest.items()]
+        found = [answer._replace(**bits[kind]) for kind, answer in self._newest.items()]
         self._newest.clear()
         self._status = self._limited = 0
         return found

@@ -97,8 +97,10 @@ def machine_in(bag: Path, mapping: MappingFile) -> tuple[Machine, MachineState]:
         raise ValueError(f'{bag}: none of the topics of {mapping.name}; it has {", ".join(sorted(known)) or "none"}')
     machine = make_machine(mapping.file, mapping.configurations, read_definitions(bag, mapping.file.topics.values()))
     offset = _clock_offset(machine, bag)
-    states = (one._replace(pipeline=one.pipeline._replace(clock_offset=offset)) for one in init(machine).actuators)
-    return machine, MachineState(tuple(states))
+    state = init(machine)
+    for one in state.actuators:
+        one.pipeline.clock_offset = offset
+    return machine, state
 
 
 def _clock_offset(machine: Machine, bag: Path) -> int:
@@ -210,7 +212,8 @@ class Translation:
     def follow(self, clock: Clock, received: int) -> None:
         """Follow simulated time."""
         offset = clock.stamp - received
-        self._states = [known._replace(pipeline=known.pipeline._replace(clock_offset=offset)) for known in self._states]
+        for known in self._states:
+            known.pipeline.clock_offset = offset
 
 
 class ActuatorBag(NamedTuple):

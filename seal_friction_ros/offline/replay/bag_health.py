@@ -170,7 +170,7 @@ def _observed(
     parameters = configuration.parameters()
     state = init(parameters)
     if learnt is not None:
-        state = state._replace(estimator=state.estimator._replace(adaptation=learnt))
+        state.estimator.adaptation = learnt
     for block in source.blocks(kinds_of_topics(source.topics)):
         changes = np.flatnonzero(block.kinds == Kind.CONFIGURATION).tolist()
         for first, end in zip([0, *changes], [*changes, len(block.kinds)], strict=True):
@@ -180,7 +180,8 @@ def _observed(
             if messages.kinds[0] == Kind.CONFIGURATION:
                 snapshot = parse_snapshot(DECODERS[CONFIGURATION_TYPE](messages.message(0)))
                 kept = state.estimator.adaptation
-                state = snapshot.state._replace(estimator=snapshot.state.estimator._replace(adaptation=kept))
+                state = snapshot.state
+                state.estimator.adaptation = kept
                 if override is None:
                     parameters = _observing(snapshot.configuration).parameters()
             state, answers = receive_all(parameters, state, messages)
