@@ -64,7 +64,7 @@ from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics
 from seal_friction_ros.nodes.executor import run
 from seal_friction_ros.nodes.graph_watch import GraphFindings, GraphWatch
 from seal_friction_ros.nodes.input_watch import InputWatch
-from seal_friction_ros.nodes.managed_node import OVERDUE, ManagedNode, message_class
+from seal_friction_ros.nodes.managed_node import OVERDUE, ManagedNode, message_class, status_of
 from seal_friction_ros.nodes.recording import Recording
 from seal_friction_ros.nodes.subscription import taken, with_source_time
 from seal_friction_ros.offline.bags.bag import STATE_NAME, STATE_TYPE, message_definition
@@ -602,7 +602,7 @@ class EstimatorNode(ManagedNode):
         if sets <= applied + 1:
             return {}
         message = f'parameters were set {sets} times since the last report and applied {applied} times'
-        return {'parameters': DiagnosticStatus(level=DiagnosticStatus.WARN, message=message)}
+        return {'parameters': status_of(DiagnosticStatus.WARN, message)}
 
     def _has_placeholder(self, prefix: str) -> bool:
         """Whether the parameters with a prefix are of an actuator with a placeholder seal, while configured."""

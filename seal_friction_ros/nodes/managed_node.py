@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from importlib import import_module
 from typing import Any, TypeVar
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import ParameterException
@@ -50,6 +50,12 @@ def _may_limit_force(unknown: str, declared: Collection[str]) -> bool:
     wanted = [name for name in declared if FEEDFORWARD_PREFIX in name]
     is_similar = bool(get_close_matches(unknown, wanted, n=1, cutoff=_SIMILAR))
     return 'feedforward' in letters or parts[-1] == 'scale' or is_similar
+
+
+def status_of(level: bytes, message: str, values: Mapping[str, object] | None = None) -> DiagnosticStatus:
+    """Status of a part of a node, with values by name and unit."""
+    pairs = [KeyValue(key=key, value=str(value)) for key, value in (values or {}).items()]
+    return DiagnosticStatus(level=level, message=message, values=pairs)
 
 
 class _SteadyTimer:

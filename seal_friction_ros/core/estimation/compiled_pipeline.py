@@ -31,6 +31,7 @@ from seal_friction_ros.core.estimation.messages import (
     TICK_TYPE,
     VELOCITY_TYPE,
     Layout,
+    head_size,
 )
 from seal_friction_ros.core.estimation.pipeline import (
     PipelineParameters,
@@ -192,10 +193,7 @@ def _numbers(data: Bytes, offset: int, count: int) -> tuple[float, float, float]
     return first, second, third
 
 
-@compiled
-def _head_size(frame_length: int) -> int:
-    """As `messages.head_size`."""
-    return (12 + frame_length + 7) // 8 * 8
+_head_size = compiled(head_size)
 
 
 @compiled

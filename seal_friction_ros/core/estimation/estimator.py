@@ -406,9 +406,13 @@ def estimate_at(
         parameters, parameters.followed_elasticity, state, seen, adapted, estimate
     )
     if not estimate.status & _NO_READING:
-        state.hidden = _hidden_motion(parameters.settings, state, seen, elapsed, friction)
-        if velocity != 0.0:
-            state.swing = _swing(state.swing, seen, elapsed, estimate.friction_force)
+        hidden, swing, measured = state.hidden, state.swing, state.velocity.velocity
+        if measured * velocity <= 0.0 or hidden.speed > 0.0 or hidden.doubt > 0.0:
+            moment = Apparent(elapsed, measured, velocity, seen.force_sum, friction.coulomb_friction)
+            state.hidden = with_sample(hidden, moment, parameters.settings.slip_velocity)
+        is_short = abs(swing.way) <= LONGEST_SWING or (velocity > 0.0) != (swing.way > 0.0)
+        if velocity != 0.0 and (is_short or swing.doubted > 0.0):
+            state.swing = swing_on(swing, elapsed, velocity, seen.force_sum, estimate.friction_force)
         if state.hidden.doubt > 0.0 or (velocity != 0.0 and state.swing.doubted > 0.0):
             estimate = replace(estimate, status=estimate.status | BITS.MOTION_UNCERTAIN)
     return estimate, seen, friction
@@ -489,26 +493,6 @@ def _estimate_with_learnt(
     offset = offset_here(known) + learnt.terms.remainder
     seen = replace(seen, force_sum=seen.force_sum - taken_off, status=status)
     return adapted, estimate_of(parameters, seen, adapted, learnt_scale(settings, learnt), scale_std, offset, left)
-
-
-@compilable
-def _hidden_motion(
-    settings: EstimatorSettings, state: EstimatorState, seen: Observation, elapsed: float, friction: ActuatorFriction
-) -> HiddenMotion:
-    """What is known of a motion in what counts as ripple of the measured velocity."""
-    known, measured = state.hidden, state.velocity.velocity
-    if not (measured * seen.velocity <= 0.0 or known.speed > 0.0 or known.doubt > 0.0):
-        return known
-    moment = Apparent(elapsed, measured, seen.velocity, seen.force_sum, friction.coulomb_friction)
-    return with_sample(known, moment, settings.slip_velocity)
-
-
-@compilable
-def _swing(known: Swing, seen: Observation, elapsed: float, friction_force: float) -> Swing:
-    """The swing of a sliding rod; long strokes, as most are, are not followed."""
-    if known.doubted == 0.0 and abs(known.way) > LONGEST_SWING and (seen.velocity > 0.0) == (known.way > 0.0):
-        return known
-    return swing_on(known, elapsed, seen.velocity, seen.force_sum, friction_force)
 
 
 @compilable
@@ -646,10 +630,8 @@ def _force_sum_on_rod(parameters: Any, force: Force, pressure: Pressure) -> floa
     """Measured force sum, corrected [N]."""
     if not parameters.corrects_force_sum or force.stamp == NEVER:
         return force.force
-    found: float = corrected_force_sum(
-        parameters.force_sum_correction, force.force, pressure.chamber_a, pressure.chamber_b
-    )
-    return found
+    correction = parameters.force_sum_correction
+    return corrected_force_sum(correction, force.force, pressure.chamber_a, pressure.chamber_b)
 
 
 @compilable

@@ -282,9 +282,7 @@ def elastic_step(
         present: Wanted velocity without lead [m/s].
         led: From `led_velocity` [m/s].
     """
-    elapsed = (received - state.received) * 1e-9
-    if state.received == NEVER or received < state.received:
-        elapsed = 0.0
+    elapsed = 0.0 if state.received == NEVER or received < state.received else (received - state.received) * 1e-9
     valid = friction >= 0.0 and not math.isnan(velocity)
     if not friction >= 0.0:
         friction = state.friction
