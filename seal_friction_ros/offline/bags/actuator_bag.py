@@ -9,6 +9,7 @@ node makes of the same messages, at their log times.
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -212,8 +213,7 @@ class Translation:
     def follow(self, clock: Clock, received: int) -> None:
         """Follow simulated time."""
         offset = clock.stamp - received
-        for known in self._states:
-            known.pipeline.clock_offset = offset
+        self._states = [one._replace(pipeline=replace(one.pipeline, clock_offset=offset)) for one in self._states]
 
 
 class ActuatorBag(NamedTuple):
