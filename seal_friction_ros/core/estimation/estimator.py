@@ -631,7 +631,8 @@ def _force_sum_on_rod(parameters: Any, force: Force, pressure: Pressure) -> floa
     if not parameters.corrects_force_sum or force.stamp == NEVER:
         return force.force
     correction = parameters.force_sum_correction
-    return corrected_force_sum(correction, force.force, pressure.chamber_a, pressure.chamber_b)
+    found: float = corrected_force_sum(correction, force.force, pressure.chamber_a, pressure.chamber_b)
+    return found
 
 
 @compilable
