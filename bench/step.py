@@ -67,11 +67,10 @@ def samples(receive_one: Callable[..., Any], parameters: PipelineParameters, sta
 
     def one() -> None:
         """The next moment."""
-        nonlocal state
         number = next(numbers)
         stamp, side = number * 1_000_000, 1.0 if number // 1000 % 2 == 0 else -1.0
         for message in (Pressure(stamp, 3e6, 1e6), Force(stamp, side * 20.0), Velocity(stamp, side * 0.1, b'rod')):
-            state = receive_one(parameters, state, message, stamp, drop)
+            receive_one(parameters, state, message, stamp, drop)
 
     return one
 
@@ -87,9 +86,9 @@ def stages() -> dict[str, Callable[[], object]]:
     pressure, force, velocity = Pressure(1, 3e6, 1e6), Force(1, 20.0), Velocity(1, 0.1, b'rod')
 
     sample = RodSample(1, 0.1, pressure, force)
-    alone = init(parameters)._replace(pressure=pressure, force=force)
-    guided = init_running(parameters)._replace(pressure=pressure, force=force)
-    guided = receive(parameters, guided, ServoReference(1, 0.0, 0.1, 0.0), 1, drop)
+    alone = replace(init(parameters), pressure=pressure, force=force)
+    guided = replace(init_running(parameters), pressure=pressure, force=force)
+    receive(parameters, guided, ServoReference(1, 0.0, 0.1, 0.0), 1, drop)
     records: list[tuple[Output, bytes]] = []
     receive(parameters, guided, velocity, 1, lambda record, frame: records.append((record, frame)))
     estimate, feedforward = records

@@ -32,7 +32,7 @@ DATA_BOXES = {  # text: x and y of the middle, width, height, colour
     'bag (MCAP)\ninputs, answers,\nseal files, settings': (3.35, 6.87, 1.75, 0.62, style.LIGHT_GREY),
     'nodes\nfriction_estimator': (1.05, 5.97, 1.75, 0.46, style.ORANGE),
     'offline/replay': (3.35, 5.97, 1.75, 0.46, style.SKY),
-    'core/estimation\nstate = receive(parameters, state, message, emit)': (2.2, 5.07, 4.05, 0.5, style.GREEN),
+    'core/estimation\nreceive(parameters, state, message, emit)': (2.2, 5.07, 4.05, 0.5, style.GREEN),
     'output topics\nfriction_estimate,\nfriction_feedforward': (1.05, 4.09, 1.75, 0.62, style.LIGHT_GREY),
     'replayed bytes\n= recorded bytes?': (3.35, 4.09, 1.75, 0.62, style.LIGHT_GREY),
 }

@@ -17,8 +17,8 @@ from seal_friction_msgs.msg import FrictionEstimate
 
 from seal_friction_ros.core.estimation.messages import INPUTS, VELOCITY_TYPE
 from seal_friction_ros.nodes import qos
-from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.estimator_diagnostics import latency_values
+from seal_friction_ros.nodes.executor import run_tool
 from seal_friction_ros.nodes.managed_node import message_class
 from seal_friction_ros.offline.bags.bag import BagError, BagMessage, read_messages
 
@@ -130,22 +130,15 @@ def main() -> int:
     arguments = parser.parse_args(remove_ros_args(sys.argv)[1:])
     if not 0.0 <= arguments.rate < float('inf'):
         parser.error(f'--rate {arguments.rate}: must be finite and not negative')
-    set_up_discovery()
-    rclpy.init()
-    player = BagPlayer()
-    try:
+
+    def act(player: BagPlayer) -> int:
+        """Play the bag once there is an estimator."""
         if not player.wait_for_estimator(arguments.wait):
             raise BagError(f'no estimator subscribed to the inputs within {arguments.wait} s')
         print(json.dumps(play(player, arguments.bag, arguments.rate)))
-    except BagError as error:
-        print(f'bag_player: {error}', file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return 130
-    finally:
-        player.destroy_node()
-        rclpy.try_shutdown()
-    return 0
+        return 0
+
+    return run_tool(BagPlayer, act, 'bag_player')
 
 
 if __name__ == '__main__':

@@ -4,12 +4,12 @@ import time
 from collections import Counter, deque
 from collections.abc import Collection
 
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationState
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorState
 from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
-from seal_friction_ros.core.estimation.messages import CLOCK_TOPIC, INPUTS
+from seal_friction_ros.core.estimation.messages import CLOCK_TOPIC, INPUTS, Output
 from seal_friction_ros.core.estimation.pipeline import Turn
 from seal_friction_ros.core.estimation.records import NEVER, NO_ESTIMATE, FrictionEstimate, Status
 from seal_friction_ros.core.estimation.seal_health import (
@@ -21,8 +21,8 @@ from seal_friction_ros.core.estimation.seal_health import (
     with_sample,
 )
 from seal_friction_ros.core.estimation.swings import NO_SWING, Swing
-from seal_friction_ros.core.machine.answers_together import NamedAnswer
 from seal_friction_ros.nodes.graph_watch import GraphFindings
+from seal_friction_ros.nodes.managed_node import status_of
 
 _SHORTEST_SILENCE = 0.9  # [s] in a shorter interval, no estimate means no fault if the interval before had one
 _LARGEST_NEAR_REST = 0.25  # [-] of the estimates, for each status bit of `_NEAR_REST_MESSAGES`; each reversal has some
@@ -178,11 +178,8 @@ class EstimatorDiagnostics:
         """Indicators of the seals, WARN with what a person should know."""
         said = findings(parameters, self._health, self._estimate.status)
         values = health_values(parameters, adaptation, self._health, self._starts)
-        return DiagnosticStatus(
-            level=DiagnosticStatus.WARN if said else DiagnosticStatus.OK,
-            message='; '.join(said) or 'no finding',
-            values=[KeyValue(key=key, value=value) for key, value in values.items()],
-        )
+        level = DiagnosticStatus.WARN if said else DiagnosticStatus.OK
+        return status_of(level, '; '.join(said) or 'no finding', values)
 
     def on_feedforward(self, feedforward: FeedForward) -> None:
         """Count one feed-forward."""
@@ -197,10 +194,10 @@ class EstimatorDiagnostics:
         self._newest[FeedForward] = feedforward
         self._limited |= feedforward.limited
 
-    def take_newest(self, actuator: str) -> list[NamedAnswer]:
+    def take_newest(self) -> list[Output]:
         """The newest answers since the last call, for who looks on: each with the bits of all answers since then."""
         bits = {FrictionEstimate: {'status': self._status}, FeedForward: {'limited': self._limited}}
-        found = [NamedAnswer(actuator, answer._replace(**bits[kind]), b'') for kind, answer in self._newest.items()]
+        found = [answer._replace(**bits[kind]) for kind, answer in self._newest.items()]
         self._newest.clear()
         self._status = self._limited = 0
         return found
@@ -246,11 +243,7 @@ class EstimatorDiagnostics:
             values |= health_values(parameters, known.adaptation, self._health, self._starts)
         values['swing without force [um]'] = f'{swing.doubted * 1e6:.1f}'
         values |= {f'{name} best effort only, from': node for name, node in graph.best_effort.items()}
-        return DiagnosticStatus(
-            level=level,
-            message='; '.join([*graph.duplicates, *graph.unheard, message]),
-            values=[KeyValue(key=key, value=value) for key, value in values.items()],
-        )
+        return status_of(level, '; '.join([*graph.duplicates, *graph.unheard, message]), values)
 
     def _level(self, seconds: float, parameters: EstimatorParameters | None, swing: Swing) -> tuple[bytes, str]:
         """Level and message of an active estimator ``seconds`` [s] after the start of the interval."""

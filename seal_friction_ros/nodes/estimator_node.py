@@ -64,9 +64,9 @@ from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics
 from seal_friction_ros.nodes.executor import run
 from seal_friction_ros.nodes.graph_watch import GraphFindings, GraphWatch
 from seal_friction_ros.nodes.input_watch import InputWatch
-from seal_friction_ros.nodes.managed_node import OVERDUE, ManagedNode, message_class
+from seal_friction_ros.nodes.managed_node import OVERDUE, ManagedNode, message_class, status_of
 from seal_friction_ros.nodes.recording import Recording
-from seal_friction_ros.nodes.subscription import with_source_time
+from seal_friction_ros.nodes.subscription import taken, with_source_time
 from seal_friction_ros.offline.bags.bag import STATE_NAME, STATE_TYPE
 from seal_friction_ros.offline.bags.definitions import message_definition
 
@@ -137,12 +137,14 @@ class EstimatorNode(ManagedNode):
         self._sorts_until = 0  # [ns] of `time.perf_counter_ns`
         self._is_change_due, self._applied = False, 0  # [ns] of `time.perf_counter_ns`
         self._sets = self._applications = 0  # of parameters since the last report
-        self._timers: list[Any] = []
         super().__init__(name, groups, **kwargs)
         self._recording = Recording(self.get_fully_qualified_name())
-        self.create_service(Trigger, '~/start_recording', self._on_start_recording)
-        self.create_service(Trigger, '~/stop_recording', self._on_stop_recording)
-        self.create_service(Trigger, '~/reset_adaptation', self._on_reset_adaptation)
+        for service, act, refusal in (
+            ('start_recording', self._start_recording, 'not active: nothing to record'),
+            ('stop_recording', self._stop_recording, ''),
+            ('reset_adaptation', self._reset_adaptation, 'not active: nothing is learnt'),
+        ):
+            self.create_service(Trigger, f'~/{service}', partial(self._serve, act, refusal))
 
     # --- lifecycle ---
 
@@ -246,26 +248,31 @@ class EstimatorNode(ManagedNode):
 
     def start(self) -> None:
         """Start to estimate from the initial state, and to record if ``record`` is set."""
-        self._state = _with(init(self._machine), refused=self._is_refused(self._watch.duplicate_publishers()))
+        self._state = init(self._machine)
+        self._set(refused=self._is_refused(self._watch.duplicate_publishers()))
         if CLOCK_TOPIC in self._types:
-            self._state = _with(self._state, clock=0)  # stands still until it comes
+            self._set(clock=0)  # stands still until it comes
         self._new_statistics()
         self._newest.clear()
-        self._begin()
+        self._logged_errors.clear()
+        self._watchdog_called = time.perf_counter_ns()
+        self._receipt_offset = time.time_ns() - time.monotonic_ns()
+        needed = [name for name in self._types if name not in _OPTIONAL_INPUTS]
+        self._input_watch = InputWatch(needed, time.monotonic(), self._watch.publishers_text)
+        if self.settings(RecordingOptions).record:
+            self._start_recording()
+        else:
+            self.publish_configuration()
+        self.get_logger().info('estimating')
 
     def release(self) -> None:
-        """Destroy publishers, subscriptions and timers."""
+        """Destroy publishers and subscriptions."""
         for subscription in (*self._inputs.values(), *self._recorded_only):
             self.destroy_subscription(subscription)
         for publisher in self._outputs.values():
             self.destroy_publisher(publisher)
-        for timer in self._timers:
-            self.destroy_timer(timer)
-        self._inputs.clear()
-        self._recorded_only.clear()
-        self._outputs.clear()
-        self._publish.clear()
-        self._timers.clear()
+        for made in (self._inputs, self._recorded_only, self._outputs, self._publish):
+            made.clear()
 
     def _create_timers(self) -> None:
         """Timers of the graph, the watchdog and the health, and the publisher of the health."""
@@ -279,40 +286,23 @@ class EstimatorNode(ManagedNode):
         self._tick_timer = self.create_steady_timer(_TICK_PERIOD, self._on_watchdog_timer)
         self._tick_timer.cancel()
         self._is_ticking = False
-        self._timers = [
-            self._tick_timer,
-            self.create_steady_timer(_WATCHDOG_PERIOD, self._on_watchdog_timer),
-            self.create_steady_timer(_HEALTH_PERIOD, self._on_health_timer),
-            self.create_steady_timer(_INPUT_PERIOD, self._on_input_timer),
-        ]
-
-    def _begin(self) -> None:
-        """Begin to record if ``record`` is set."""
-        self._logged_errors.clear()
-        self._watchdog_called = time.perf_counter_ns()
-        self._receipt_offset = time.time_ns() - time.monotonic_ns()
-        needed = [name for name in self._types if name not in _OPTIONAL_INPUTS]
-        self._input_watch = InputWatch(needed, time.monotonic(), self._watch.publishers_text)
-        if self.settings(RecordingOptions).record:
-            self._start_recording()
-        else:
-            self.publish_configuration()
-        self.get_logger().info('estimating')
+        self.create_steady_timer(_WATCHDOG_PERIOD, self._on_watchdog_timer)
+        self.create_steady_timer(_HEALTH_PERIOD, self._on_health_timer)
+        self.create_steady_timer(_INPUT_PERIOD, self._on_input_timer)
 
     def finish(self) -> None:
         """Bring the force to 0 N, stop estimating, finish the bag."""
         if self.active:
             self.fade_out()
         self.active = False
-        outcome = self._recording.close()
-        if outcome:
+        if outcome := self._recording.close():
             self.get_logger().info(outcome)
 
     # --- the live path ---
 
     def on_input(self, name: str, data: bytes, lateness: int) -> None:
         """Take one message of an input, ``lateness`` [ns] after it was sent."""
-        taken = time.perf_counter_ns()
+        began = time.perf_counter_ns()
         if not self.active:
             return
         plan = self._plans[name]
@@ -320,7 +310,7 @@ class EstimatorNode(ManagedNode):
             message = plan.read(data)
         except ValueError as error:
             self._on_malformed(name, error)
-            self._look_after_timers(taken)
+            self._look_after_timers(began)
             return
         received, before = self._now(), self._state
         sent = max(received - lateness, 0)
@@ -333,15 +323,13 @@ class EstimatorNode(ManagedNode):
         self._recording.record(self._topics[name], self._types[name], received, data, sent)
         if self.has_viewer:
             self._newest_inputs[self._topics[name]] = TopicMessage(self._topics[name], self._types[name], data)
-        stamp = None
-        if plan.holds_records:
-            stamp = message.stamp
-        else:
+        if not plan.holds_records:
             self._newest[name] = data
+        stamp = message.stamp if plan.holds_records else None
         for listener in self._listeners[name]:
             listener.on_input(name, stamp, lateness)
         if self._sent:
-            self._record_answers(commands, done - taken)
+            self._record_answers(commands, done - began)
             self._follow(before)
             self._recording.flush_if_idle()
         self._look_after_timers(done)
@@ -423,7 +411,7 @@ class EstimatorNode(ManagedNode):
         acting = [number for number, known in enumerate(self._state.actuators) if known.force != 0.0]
         if not acting:
             return
-        self._state = _with(self._state, refused=True)
+        self._set(refused=True)
         self.publish_configuration()  # a replay fades from here on
         left = _LAST_FORCES
         while left:
@@ -502,16 +490,8 @@ class EstimatorNode(ManagedNode):
 
     def _waiting(self, name: str) -> list[tuple[int, str, bytes, int]]:
         """Messages that wait in the middleware: time of receipt there [ns], input, bytes, time of sending [ns]."""
-        found: list[tuple[int, str, bytes, int]] = []
-        subscription = self._inputs[name]
-        with subscription.handle:
-            while len(found) < _MOST_WAITING:
-                taken = subscription.handle.take_message(subscription.msg_type, True)
-                if taken is None:
-                    break
-                data, info = taken
-                found.append((info['received_timestamp'], name, data, info['source_timestamp']))
-        return found
+        waiting = taken(self._inputs[name], _MOST_WAITING)
+        return [(info['received_timestamp'], name, data, info['source_timestamp']) for data, info in waiting]
 
     def _create_output(self, key: Any, topic: str, type_name: str) -> None:
         """Create the publisher of an answer or a command; ``_publish[key]`` sends the bytes of one.
@@ -563,10 +543,10 @@ class EstimatorNode(ManagedNode):
             return
         newest = list(self._newest_inputs.values())
         self._newest_inputs.clear()
-        for actuator, answer, frame_id in self._newest_answers():
-            type_name = type_of(answer)
-            topic = f'{actuator}/{_TOPIC_OF[type_name]}'
-            newest.append(TopicMessage(topic, type_name, encode(answer, frame_id)))
+        for actuator, statistics in self._statistics.items():
+            for answer in statistics.take_newest():
+                kind = type_of(answer)
+                newest.append(TopicMessage(f'{actuator}/{_TOPIC_OF[kind]}', kind, encode(answer)))
         if newest:
             self._outputs[_MONITOR].publish(encode_newest(newest))
 
@@ -592,21 +572,15 @@ class EstimatorNode(ManagedNode):
         if self.active:
             self.publish_configuration()
 
+    def _set(self, **values: Any) -> None:
+        """Set fields of the state of every actuator."""
+        for known in self._state.actuators:
+            for name, value in values.items():
+                setattr(known.pipeline, name, value)
+
     def _snapshot(self) -> str:
         """All that the next answer depends on, as text."""
         return machine_text(snapshot_of(self._machine, self._state))
-
-    def _reset_adaptation(self) -> None:
-        """Forget what the adaptation of every actuator has learnt."""
-        states = [
-            known._replace(
-                pipeline=known.pipeline._replace(estimator=known.pipeline.estimator._replace(adaptation=NOT_ADAPTED))
-            )
-            for known in self._state.actuators
-        ]
-        self._state = MachineState(tuple(states))
-        for statistics in self._statistics.values():
-            statistics.on_reset()
 
     def on_change(self, changed: Collection[Parameter]) -> None:
         """Apply changed settings between two samples, at most every `_CHANGE_PERIOD`; a force that is off, at once."""
@@ -629,7 +603,7 @@ class EstimatorNode(ManagedNode):
         if sets <= applied + 1:
             return {}
         message = f'parameters were set {sets} times since the last report and applied {applied} times'
-        return {'parameters': DiagnosticStatus(level=DiagnosticStatus.WARN, message=message)}
+        return {'parameters': status_of(DiagnosticStatus.WARN, message)}
 
     def _has_placeholder(self, prefix: str) -> bool:
         """Whether the parameters with a prefix are of an actuator with a placeholder seal, while configured."""
@@ -659,16 +633,13 @@ class EstimatorNode(ManagedNode):
         self.has_viewer = self._outputs[_MONITOR].get_subscription_count() > 0
         if self._watch.has_changed():
             self.publish_diagnostics()
-        following = self._recording.continue_in_next_bag()
-        if following:
+        if following := self._recording.continue_in_next_bag():
             self.publish_configuration()
             self.get_logger().info(f'recording to {following}')
         if self.active and self._mapping is None and self._recording.is_state_due(time.monotonic()):
             self._recording.record(self._state_topic, STATE_TYPE, self._now(), encode_text(self._snapshot()))
         if self.active and CLOCK_TOPIC not in self._inputs:
-            offset = time.time_ns() - self._now()
-            if abs(offset - self._clock_offset) > _LARGEST_CLOCK_STEP:
-                self._follow_clock(offset)
+            self._follow_clock(time.time_ns() - self._now())
 
     def _on_input_timer(self) -> None:
         """Say what the node waits for, which input has stopped, and which is back."""
@@ -682,9 +653,11 @@ class EstimatorNode(ManagedNode):
 
     def _follow_clock(self, offset: int) -> None:
         """Judge the age of stamps by a clock that was set; the time of receipt goes on."""
-        self.get_logger().warning(f'the clock was set by {(offset - self._clock_offset) * 1e-9:.3f} s')
-        self._state = _with(self._state, clock_offset=offset)
-        self.publish_configuration()
+        change = offset - self._clock_offset
+        if abs(change) > _LARGEST_CLOCK_STEP:
+            self.get_logger().warning(f'the clock was set by {change * 1e-9:.3f} s')
+            self._set(clock_offset=offset)
+            self.publish_configuration()
 
     def _now(self) -> int:
         """Time of receipt [ns]: the clock as it was at activation. It goes on whatever clocks and simulated time do."""
@@ -713,28 +686,25 @@ class EstimatorNode(ManagedNode):
         self.get_logger().info(f'recording to {path}')
         return True, str(path)
 
-    def _on_start_recording(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        del request
-        if self.active:
-            response.success, response.message = self._start_recording()
-        else:
-            response.success, response.message = False, 'not active: nothing to record'
-        return response
-
-    def _on_stop_recording(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        del request
+    def _stop_recording(self) -> tuple[bool, str]:
+        """Finish the bag in the background; success, and its path and counts or the error."""
         outcome = self._recording.stop()
-        response.success = bool(outcome) and not self._recording.failure
-        response.message = outcome or 'not recording'
-        return response
+        return bool(outcome) and not self._recording.failure, outcome or 'not recording'
 
-    def _on_reset_adaptation(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        del request
-        response.success = self.active
-        response.message = 'scale 1, offset 0 N' if self.active else 'not active: nothing is learnt'
-        if self.active:
-            self._reset_adaptation()
-            self.publish_configuration()  # a replay forgets at the same message
+    def _reset_adaptation(self) -> tuple[bool, str]:
+        """Forget what the adaptation of every actuator has learnt."""
+        for known in self._state.actuators:
+            known.pipeline.estimator.adaptation = NOT_ADAPTED
+        for statistics in self._statistics.values():
+            statistics.on_reset()
+        self.publish_configuration()  # a replay forgets at the same message
+        return True, 'scale 1, offset 0 N'
+
+    def _serve(
+        self, act: Callable[[], tuple[bool, str]], refusal: str, _request: Any, response: Trigger.Response
+    ) -> Trigger.Response:
+        """Answer a service by what ``act`` returns; by ``refusal``, if there is one, while the node is not active."""
+        response.success, response.message = act() if self.active or not refusal else (False, refusal)
         return response
 
     # --- diagnostics ---
@@ -765,25 +735,6 @@ class EstimatorNode(ManagedNode):
             said += [f'{topic}: {text}' for text in missing(self._machine, number, topic, data)]
         return said + pressure_remarks(self._file, self._file.actuators[number], self._lowest[number])
 
-    def _health_of_seals(self) -> dict[str, DiagnosticStatus]:
-        """Indicators of the seals of each actuator whose adaptation learns."""
-        found = {}
-        for actuator, known in zip(self._machine.actuators, self._state.actuators if self.active else (), strict=False):
-            if actuator.pipeline.estimator.adapts:
-                adaptation = known.pipeline.estimator.adaptation
-                found[f'{actuator.name} seals'.lstrip()] = self._statistics[actuator.name].health(
-                    actuator.pipeline.estimator, adaptation
-                )
-        return found
-
-    def _newest_answers(self) -> list[NamedAnswer]:
-        """The newest answers of each actuator since the last call."""
-        return [answer for name, statistics in self._statistics.items() for answer in statistics.take_newest(name)]
-
-    def _received(self) -> Mapping[str, int]:
-        """Messages of each input since activation."""
-        return {topic: count for one in self._statistics.values() for topic, count in one.received.items()}
-
     def _arrived(self) -> Mapping[str, int]:
         """Messages of each input; none of one whose messages never had the numbers that an actuator wants."""
         numbers = range(len(self._machine.actuators))
@@ -794,7 +745,8 @@ class EstimatorNode(ManagedNode):
         }
         self._complete |= self._newest.keys() - lacking
         never = lacking - self._complete
-        return {topic: 0 if topic in never else count for topic, count in self._received().items()}
+        counts = {topic: count for one in self._statistics.values() for topic, count in one.received.items()}
+        return {topic: 0 if topic in never else count for topic, count in counts.items()}
 
     def end_interval(self) -> None:
         """Start a new interval of rates and latencies."""
@@ -805,18 +757,19 @@ class EstimatorNode(ManagedNode):
         """Reject the inputs while ``refuse_second_publisher`` is set and topics have several publishers."""
         refused = self._is_refused(duplicates)
         if self.active and refused != self._state.actuators[0].pipeline.refused:
-            self._state = _with(self._state, refused=refused)
+            self._set(refused=refused)
             self.publish_configuration()  # a replay rejects the inputs from the same message on
 
     def _on_health_timer(self) -> None:
-        """Publish the health of the seals while the adaptation learns."""
-        message = DiagnosticArray()
-        for part, status in self._health_of_seals().items():
-            status.name = f'{self.get_fully_qualified_name()}: {part}'
-            message.status.append(status)
-        if message.status:
-            message.header.stamp = self.get_clock().now().to_msg()
-            self._outputs[_HEALTH].publish(message)
+        """Publish indicators of the seals of each actuator whose adaptation learns."""
+        found = {}
+        for actuator, known in zip(self._machine.actuators, self._state.actuators if self.active else (), strict=False):
+            parameters, statistics = actuator.pipeline.estimator, self._statistics[actuator.name]
+            if parameters.adapts:
+                part = f'{actuator.name} seals'.lstrip()
+                found[part] = statistics.health(parameters, known.pipeline.estimator.adaptation)
+        if found:
+            self._outputs[_HEALTH].publish(self.status_array(found))
 
     def _report_graph(self, graph: GraphFindings) -> DiagnosticStatus:
         """Log what is new about the graph and the recorder; status of the recorder."""
@@ -850,11 +803,6 @@ def _groups(actuator: Actuator) -> tuple[ParameterGroup, ...]:
         ParameterGroup(FeedForwardSettings, name + FEEDFORWARD_PREFIX, defaults=actuator.feedforward),
         ParameterGroup(AdaptationSettings, name + ADAPTATION_PREFIX, defaults=actuator.adaptation),
     )
-
-
-def _with(state: MachineState, **changed: Any) -> MachineState:
-    """State with fields of the pipeline of every actuator changed."""
-    return MachineState(tuple(k._replace(pipeline=k.pipeline._replace(**changed)) for k in state.actuators))
 
 
 def main(node: Callable[[], EstimatorNode]) -> int:

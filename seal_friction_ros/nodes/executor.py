@@ -83,6 +83,23 @@ def run(
     return 0
 
 
+def run_tool(make_node: Callable[[], AnyNode], act: Callable[[AnyNode], int], name: str) -> int:
+    """Create a node, let it act once, return its exit code; 2 with one line for a ValueError, 130 after Ctrl-C."""
+    set_up_discovery()
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)  # Ctrl-C is a KeyboardInterrupt
+    node = make_node()
+    try:
+        return act(node)
+    except ValueError as error:
+        print(f'{name}: {" ".join(str(error).split())}', file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
 def _await_signal(receiver: socket.socket, stopped: Future) -> None:
     receiver.recv(1)
     stopped.set_result(None)

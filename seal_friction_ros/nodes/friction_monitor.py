@@ -22,7 +22,7 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile
 from rclpy.utilities import remove_ros_args
 
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE
@@ -31,6 +31,7 @@ from seal_friction_ros.core.machine.newest_messages import NEWEST_TYPE
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.executor import run
 from seal_friction_ros.nodes.managed_node import message_class
+from seal_friction_ros.nodes.subscription import taken
 from seal_friction_ros.offline.bags.definitions import message_definition
 from seal_friction_ros.offline.monitor.live_view import RATE, LiveView, Wanted
 from seal_friction_ros.offline.monitor.node_view import NodeView
@@ -41,7 +42,7 @@ from seal_friction_ros.offline.monitor.token_file import kept_token
 NICENESS = 10  # where processors are short, an estimator has nine times the share of the monitor (our choice)
 _SEARCH_PERIOD = 1.0  # [s] between two looks for new estimators
 _CONFIGURATION, _NEWEST = '/configuration', '/monitor'  # ends of topics of a node
-_DEPTH = 8  # of the queue: the bits of every answer are shown
+_FEW = qos.best_effort(QoSProfile(depth=8))  # the bits of every answer are shown, so that few are enough
 
 
 class _Asked(NamedTuple):
@@ -114,7 +115,7 @@ class FrictionMonitor(Node):
                     message_class(CONFIGURATION_TYPE), topic, _never_called, qos.LATCHED, raw=True
                 )
                 self._newest[node] = self._listener.create_subscription(
-                    message_class(NEWEST_TYPE), node + _NEWEST, _never_called, _best_effort(_DEPTH), raw=True
+                    message_class(NEWEST_TYPE), node + _NEWEST, _never_called, _FEW, raw=True
                 )
                 if self._allow_changes:
                     self._clients_of(node)  # so that they are found before somebody presses OFF
@@ -138,12 +139,12 @@ class FrictionMonitor(Node):
         now = self._received()
         with self.view.lock:
             for node, subscription in self._configurations.items():
-                for data, about in _taken(subscription):
+                for data, about in taken(subscription):
                     self._note_start(node, about.get('publisher_gid'))
                     self._nodes[node].hear(now)
                     self._nodes[node].take(node + _CONFIGURATION, CONFIGURATION_TYPE, data, now)
             for node, subscription in self._newest.items():
-                for data, _ in _taken(subscription):
+                for data, _ in taken(subscription):
                     self._nodes[node].take_newest(data, now)
         self.view.sample(now)
         for node, values in self.view.still_on().items():
@@ -230,21 +231,8 @@ def _definitions(types: Iterable[str]) -> Mapping[str, Definition]:
     return {kind: parse_definition(kind, message_definition(full_name(kind))[0]) for kind in types}
 
 
-def _best_effort(depth: int) -> QoSProfile:
-    return QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT, durability=DurabilityPolicy.VOLATILE)
-
-
 def _never_called(_data: bytes) -> None:
     """Callback of a subscription whose messages are taken."""
-
-
-def _taken(subscription: Any) -> list[tuple[bytes, dict[str, Any]]]:
-    """Messages that have come since the last call, as bytes, and what the middleware knows of each."""
-    found = []
-    with subscription.handle:
-        while (message := subscription.handle.take_message(subscription.msg_type, True)) is not None:
-            found.append(message)
-    return found
 
 
 def main() -> int:

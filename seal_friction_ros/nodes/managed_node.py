@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from importlib import import_module
 from typing import Any, TypeVar
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import ParameterException
@@ -52,30 +52,30 @@ def _may_limit_force(unknown: str, declared: Collection[str]) -> bool:
     return 'feedforward' in letters or parts[-1] == 'scale' or is_similar
 
 
+def status_of(level: bytes, message: str, values: Mapping[str, object] | None = None) -> DiagnosticStatus:
+    """Status of a part of a node, with values by name and unit."""
+    pairs = [KeyValue(key=key, value=str(value)) for key, value in (values or {}).items()]
+    return DiagnosticStatus(level=level, message=message, values=pairs)
+
+
 class _SteadyTimer:
-    """When a timer was called last.
+    """When a timer with a period [ns] was called last."""
 
-    Args:
-        callback: What it calls.
-        period: [ns]
-        now: [ns] of the steady clock.
-    """
-
-    def __init__(self, callback: Callable[[], None], period: int, now: int) -> None:
-        self._callback, self._period, self._called = callback, period, now
+    def __init__(self, callback: Callable[[], None], period: int) -> None:
+        self._callback, self._period, self._called = callback, period, time.monotonic_ns()
 
     def call(self) -> None:
         """Call it now."""
         self._called = time.monotonic_ns()
         self._callback()
 
-    def was_just_called(self, now: int) -> bool:
+    def was_just_called(self) -> bool:
         """Whether less than half a period has passed: after a call out of turn."""
-        return 2 * (now - self._called) < self._period
+        return 2 * (time.monotonic_ns() - self._called) < self._period
 
-    def is_overdue(self, now: int) -> bool:
+    def is_overdue(self) -> bool:
         """Whether the executor is late."""
-        return now - self._called > self._period + OVERDUE
+        return time.monotonic_ns() - self._called > self._period + OVERDUE
 
 
 class ManagedNode(LifecycleNode):
@@ -98,9 +98,8 @@ class ManagedNode(LifecycleNode):
         self.active = False
         self.configured = False
         self._groups = groups
-        self._diagnostics_timer: Any = None
         self._steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
-        self._steady_timers: list[_SteadyTimer] = []
+        self._steady_timers: dict[Any, _SteadyTimer] = {}
         self._diagnostics_publisher: Any = None
         try:
             for group in groups:
@@ -220,7 +219,7 @@ class ManagedNode(LifecycleNode):
             self._diagnostics_publisher = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
             self.make()
             take_realtime_priority(self.settings(StartOptions).realtime_priority)
-            self._diagnostics_timer = self.create_steady_timer(_DIAGNOSTICS_PERIOD, self._on_timer)
+            self.create_steady_timer(_DIAGNOSTICS_PERIOD, self._on_timer)
         except Exception as error:  # noqa: BLE001  rclpy swallows exceptions of transitions
             self.get_logger().error(str(error))
             self._release()
@@ -257,29 +256,30 @@ class ManagedNode(LifecycleNode):
 
     def _release(self) -> None:
         self.configured = False
-        if self._diagnostics_timer is not None:
-            self.destroy_timer(self._diagnostics_timer)
+        for timer in self._steady_timers:
+            self.destroy_timer(timer)
+        self._steady_timers.clear()
         if self._diagnostics_publisher is not None:
             self.destroy_publisher(self._diagnostics_publisher)
-        self._diagnostics_timer = self._diagnostics_publisher = None
-        self._steady_timers.clear()
+        self._diagnostics_publisher = None
         self.release()
 
     def create_steady_timer(self, period: float, callback: Callable[[], None]) -> Any:
-        """Timer with ``period`` [s] of steady time, which continues while simulated time stands still.
+        """Timer with ``period`` [s] of steady time, which continues while simulated time stands still, until `release`.
 
         An executor may call a timer that was due just before its destruction: unconfigured, the node ignores the call.
         """
-        made = _SteadyTimer(callback, round(period * 1e9), time.monotonic_ns())
-        self._steady_timers.append(made)
+        made = _SteadyTimer(callback, round(period * 1e9))
 
         def call() -> None:
-            if self.configured and not made.was_just_called(time.monotonic_ns()):
+            if self.configured and not made.was_just_called():
                 made.call()
 
         # rclpy asks for the signature at every call; without a ready one that is most of the time of a short callback.
         call.__signature__ = inspect.Signature()  # type: ignore[attr-defined]
-        return self.create_timer(period, call, clock=self._steady_clock)
+        timer = self.create_timer(period, call, clock=self._steady_clock)
+        self._steady_timers[timer] = made
+        return timer
 
     def call_overdue_timers(self) -> None:
         """Call the timers that the executor has not called in time.
@@ -287,10 +287,9 @@ class ManagedNode(LifecycleNode):
         An executor that is behind with messages takes these first: on a machine that is too busy a timer comes seconds
         late. A node calls this after a message.
         """
-        now = time.monotonic_ns()
-        for timer in self._steady_timers:
-            if self.configured and timer.is_overdue(now):
-                timer.call()
+        for made in list(self._steady_timers.values()):
+            if self.configured and made.is_overdue():
+                made.call()
 
     def _on_timer(self) -> None:
         self.publish_diagnostics()
@@ -298,9 +297,13 @@ class ManagedNode(LifecycleNode):
 
     def publish_diagnostics(self) -> None:
         """Publish the present diagnostics."""
+        self._diagnostics_publisher.publish(self.status_array(self.diagnostics()))
+
+    def status_array(self, parts: Mapping[str, DiagnosticStatus]) -> DiagnosticArray:
+        """Message of the status of parts of this node."""
         message = DiagnosticArray()
-        for part, status in self.diagnostics().items():
+        for part, status in parts.items():
             status.name = f'{self.get_fully_qualified_name()}: {part}'
             message.status.append(status)
         message.header.stamp = self.get_clock().now().to_msg()
-        self._diagnostics_publisher.publish(message)
+        return message

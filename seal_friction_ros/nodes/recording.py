@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
 
 from seal_friction_ros.core.estimation.node_options import RecordingOptions
+from seal_friction_ros.nodes.managed_node import status_of
 from seal_friction_ros.offline.bags.bag import BagError, timed_name
 from seal_friction_ros.offline.bags.recorder import Recorder
 
@@ -117,21 +118,15 @@ class Recording:
     def report(self) -> DiagnosticStatus:
         """Status of the recorder."""
         self._forget_finished()
-        status = DiagnosticStatus(level=DiagnosticStatus.OK, message='not recording')
-        values = {}
+        level, message, values, failure = DiagnosticStatus.OK, 'not recording', {}, self.failure
         recorder = self._recorder or next(iter(self._finishing), None)
         if recorder is not None:
-            status.message = 'recording' if recorder is self._recorder else 'writing the end of a bag'
-            values = {
-                'bag': str(recorder.path),
-                'written': str(recorder.written),
-                'waiting': str(recorder.waiting),
-                'dropped': str(recorder.dropped),
-            }
+            message = 'recording' if recorder is self._recorder else 'writing the end of a bag'
+            failure = recorder.error or failure
+            names = ('written', 'waiting', 'dropped')
+            values = {'bag': recorder.path, **{name: getattr(recorder, name) for name in names}}
             if recorder.dropped:
-                status.level, status.message = DiagnosticStatus.WARN, f'{recorder.dropped} messages dropped'
-        failure = recorder.error if recorder is not None and recorder.error else self.failure
+                level, message = DiagnosticStatus.WARN, f'{recorder.dropped} messages dropped'
         if failure:
-            status.level, status.message = DiagnosticStatus.ERROR, failure
-        status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
-        return status
+            level, message = DiagnosticStatus.ERROR, failure
+        return status_of(level, message, values)

@@ -1,6 +1,7 @@
-"""Callback of a subscription that needs to know when a message was sent."""
+"""What rclpy has not: callbacks that know when a message was sent, and messages taken without a callback."""
 
 import inspect
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -23,3 +24,15 @@ def with_source_time(callback: Callable[[Any, int, int], None]) -> Callable[...,
 
     call.__signature__ = _TWO  # type: ignore[attr-defined]
     return call
+
+
+def taken(subscription: Any, most: int = sys.maxsize) -> list[tuple[bytes, dict[str, Any]]]:
+    """Messages that wait in the middleware, at most so many, as bytes, and what it knows of each."""
+    found: list[tuple[bytes, dict[str, Any]]] = []
+    with subscription.handle:
+        while len(found) < most:
+            message = subscription.handle.take_message(subscription.msg_type, True)
+            if message is None:
+                break
+            found.append(message)
+    return found

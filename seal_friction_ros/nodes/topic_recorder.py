@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 
 from seal_friction_ros.nodes import qos
-from seal_friction_ros.nodes.discovery import set_up_discovery
+from seal_friction_ros.nodes.executor import run_tool
 from seal_friction_ros.nodes.managed_node import message_class
 from seal_friction_ros.offline.bags.bag import BagError, BagWriter
 
@@ -44,8 +44,8 @@ class TopicRecorder(Node):
         self.messages.append((topic, kind, time.time_ns(), data))
 
 
-def record(node: TopicRecorder, seconds: float, wait: float, out: Path) -> None:
-    """Record for ``seconds`` [s], from the first message on, for which it waits ``wait`` [s] at most.
+def record(node: TopicRecorder, seconds: float, wait: float, out: Path) -> int:
+    """Record for ``seconds`` [s], from the first message on, for which it waits ``wait`` [s] at most; exit code 0.
 
     Raises:
         BagError: No topic of the types has a message, or the bag cannot be written.
@@ -66,6 +66,7 @@ def record(node: TopicRecorder, seconds: float, wait: float, out: Path) -> None:
     with BagWriter(out) as writer:
         for message in node.messages:
             writer.write(*message)
+    return 0
 
 
 def main() -> int:
@@ -76,20 +77,9 @@ def main() -> int:
     parser.add_argument('--wait', type=float, required=True, help='for the first message [s]')
     parser.add_argument('--out', type=Path, required=True, help='bag to write')
     arguments = parser.parse_args(remove_ros_args(sys.argv)[1:])
-    set_up_discovery()
-    rclpy.init()
-    node = TopicRecorder(arguments.types)
-    try:
-        record(node, arguments.seconds, arguments.wait, arguments.out)
-    except BagError as error:
-        print(f'topic_recorder: {error}', file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return 130
-    finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
-    return 0
+    seconds, wait, out = arguments.seconds, arguments.wait, arguments.out
+    make = partial(TopicRecorder, arguments.types)
+    return run_tool(make, lambda node: record(node, seconds, wait, out), 'topic_recorder')
 
 
 if __name__ == '__main__':

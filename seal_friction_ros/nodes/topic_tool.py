@@ -7,6 +7,7 @@ import json
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from importlib import import_module
 from itertools import pairwise
 from typing import Any
@@ -17,14 +18,13 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.signals import SignalHandlerOptions
 
 from seal_friction_ros.core.foundation.parameters import meant
-from seal_friction_ros.nodes.discovery import set_up_discovery
+from seal_friction_ros.nodes.executor import run_tool
 from seal_friction_ros.nodes.graph_watch import full_name
 from seal_friction_ros.nodes.managed_node import message_class
 
-SUCCESS, REFUSED, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
+SUCCESS, REFUSED = 0, 1
 _NAME = 'seal_friction_topics'
 _LONGEST_ARRAY = 20  # numbers of a field that are printed
 
@@ -198,7 +198,7 @@ def filled(message: Any, values: Mapping[str, Any]) -> Any:
             filled(old, value)
             continue
         if isinstance(old, float) and type(value) is int:
-            value = float(value)  # noqa: PLW2901
+            value = float(value)  # noqa: PLW2901  a whole number stands for the number that ROS wants
         if isinstance(old, bool | int | float | str) and type(value) is not type(old):
             raise ValueError(f'{name}: {value!r} is no {fields[name]}')
         setattr(message, name, value)
@@ -277,8 +277,15 @@ def run_task(tool: Tool, task: Mapping[str, Any]) -> int:
     return _param(tool, task, show)
 
 
+def _loaded(text: str) -> Any:
+    try:
+        return yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise ValueError(str(error)) from None
+
+
 def _mapping(text: str) -> Mapping[str, Any]:
-    value = yaml.safe_load(text)
+    value = _loaded(text)
     if not isinstance(value, Mapping):
         raise ValueError(f'{text}: give the fields as in YAML, for example "{{data: true}}"')
     return value
@@ -298,7 +305,7 @@ def _param(tool: Tool, task: Mapping[str, Any], show: Callable[..., None]) -> in
         show(tool.values(client, who, [name]))
         return SUCCESS
     (old,) = tool.values(client, who, [name]).values()
-    value = yaml.safe_load(task['value'])
+    value = _loaded(task['value'])
     if isinstance(old, float) and isinstance(value, int) and not isinstance(value, bool):
         value = float(value)
     (result,) = tool.answer(client.set_parameters([Parameter(name, value=value)]), who).results
@@ -311,19 +318,8 @@ def _param(tool: Tool, task: Mapping[str, Any], show: Callable[..., None]) -> in
 def main() -> int:
     """Run ``python -m seal_friction_ros.nodes.topic_tool TASK``, a task of `run_task` as JSON."""
     task = json.loads(sys.argv[1])
-    set_up_discovery()
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)  # Ctrl-C is a KeyboardInterrupt
-    node = Node(_NAME, start_parameter_services=False, enable_rosout=False)
-    try:
-        return run_task(Tool(node, task['wait']), task)
-    except (ValueError, yaml.YAMLError) as error:
-        print(f'seal_friction topics: {" ".join(str(error).split())}', file=sys.stderr)
-        return UNUSABLE
-    except KeyboardInterrupt:
-        return INTERRUPTED
-    finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
+    make = partial(Node, _NAME, start_parameter_services=False, enable_rosout=False)
+    return run_tool(make, lambda node: run_task(Tool(node, task['wait']), task), 'seal_friction topics')
 
 
 if __name__ == '__main__':

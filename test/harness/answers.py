@@ -34,4 +34,6 @@ def receive_one(
         answer = answer._replace(**{field: record, 'frame_id': frame_id})
 
     received = message.stamp if received is None else received
-    return receive(parameters, state, message, received, take, sent), answer
+    state = state.copy()
+    receive(parameters, state, message, received, take, sent)
+    return state, answer

@@ -106,7 +106,7 @@ class Axis(Node):
 
     def __init__(self) -> None:
         super().__init__('hydraulic_axis')
-        self._random = random.Random(1)  # noqa: S311
+        self._random = random.Random(1)  # noqa: S311  no secret
         sensors = qos_profile_sensor_data
         self._joints = self.create_publisher(JointState, '/joint_states', sensors)
         self._reference = self.create_publisher(JointState, '/reference', 10)

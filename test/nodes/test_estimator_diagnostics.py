@@ -52,7 +52,8 @@ def test_a_velocity_that_hums_is_named():
     diagnostics, watched = EstimatorDiagnostics(), GraphFindings(dict.fromkeys(INPUTS, 1), [], [], {})
     for i in range(100):
         diagnostics.on_estimate(NO_ESTIMATE._replace(status=int(Status.MOTION_UNCERTAIN) if i < 50 else 0), 1000)
-    known = init(default_configuration().parameters().estimator)._replace(swing=NO_SWING._replace(doubted=64e-6))
+    known = init(default_configuration().parameters().estimator)
+    known.swing = NO_SWING._replace(doubted=64e-6)
     report = diagnostics.report(True, False, watched, known=known)
     assert report.message.endswith('swings by 64 um, the force sum does not show it: hum, or a wrong force sum')
     assert {value.key: value.value for value in report.values}['swing without force [um]'] == '64.0'
@@ -85,16 +86,16 @@ def test_each_bit_has_its_share_and_none_hides_what_limits_the_force():
 
 def test_who_looks_on_gets_the_newest_answers_with_the_bits_of_all_since_the_last_look():
     statistics = EstimatorDiagnostics()
-    assert statistics.take_newest('boom') == []
+    assert statistics.take_newest() == []
     for number, (status, limited) in enumerate([(0, 0), (int(Status.FORCE_STALE), int(Limited.CLAMP)), (0, 0)]):
         statistics.on_estimate(NO_ESTIMATE._replace(stamp=number, status=status), 1)
         statistics.on_feedforward(FeedForward(number, float(number), 0.9, limited))
-    estimate, feedforward = statistics.take_newest('boom')
-    assert (estimate.actuator, estimate.record.stamp, estimate.record.status) == ('boom', 2, Status.FORCE_STALE)
-    assert (feedforward.record.force, feedforward.record.limited) == (2.0, Limited.CLAMP)
-    assert statistics.take_newest('boom') == []
+    estimate, feedforward = statistics.take_newest()
+    assert (estimate.stamp, estimate.status) == (2, Status.FORCE_STALE)
+    assert (feedforward.force, feedforward.limited) == (2.0, Limited.CLAMP)
+    assert statistics.take_newest() == []
     statistics.on_estimate(NO_ESTIMATE, 1)
-    assert [answer.record.status for answer in statistics.take_newest('boom')] == [0]
+    assert [answer.status for answer in statistics.take_newest()] == [0]
 
 
 GOOD = GraphFindings(dict.fromkeys(INPUTS, 1), [], [], {})

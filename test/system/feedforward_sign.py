@@ -121,7 +121,7 @@ def violations(seed: int) -> list[str]:
             ServoReference(stamp, 0.0, velocity, acceleration),
             Velocity(stamp, velocity),
         ):
-            state = receive(parameters, state, message, stamp, take)
+            receive(parameters, state, message, stamp, take)
         if forces[-1] * velocity < 0.0 or (scale == 0.0 and forces[-1] != 0.0):
             wrong.append(f'case {seed}, sample {i}: {forces[-1]} N at {velocity} m/s, scale {scale}')
     if scale > 0.1 and settings.lead_time < 1e-4 and not any(forces):

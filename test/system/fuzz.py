@@ -115,7 +115,7 @@ def log_reader() -> Callable[[Path], None]:
 def bulk_reader() -> Callable[[Path], None]:
     """Bulk reader of bags: what it accepts it must read like the general reader."""
     from seal_friction_ros.core.estimation.message_blocks import Kind, UnsuitedError  # noqa: PLC0415  loads the compiler
-    from seal_friction_ros.offline.bags.block_reader import compile_now, read_in_bulk  # noqa: PLC0415
+    from seal_friction_ros.offline.bags.block_reader import compile_now, read_in_bulk  # noqa: PLC0415  the compiler is slow to load
 
     compile_now()
 

@@ -38,7 +38,7 @@ import hypothesis
 import numpy  # noqa: F401  loaded once, before processes fork
 import pytest
 import scipy.optimize
-import scipy.sparse.linalg  # noqa: F401
+import scipy.sparse.linalg  # noqa: F401  likewise
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text

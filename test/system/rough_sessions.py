@@ -165,7 +165,7 @@ def session(case: Case, seed: int, moments: int, folder: Path) -> Outcome:
     Raises:
         RuntimeError: The node does not answer.
     """
-    chance, domain, log = random.Random(seed), free_domain(), folder / 'log'  # noqa: S311
+    chance, domain, log = random.Random(seed), free_domain(), folder / 'log'  # noqa: S311  no secret
     values: dict[str, Any] = {'record': True, 'record_directory': str(folder)}
     made: Callable[[random.Random, int, float], Messages] = of_one
     if case.answers == 'one':

@@ -163,8 +163,8 @@ def test_a_pipe_or_a_device_is_no_bag_and_is_not_waited_for(tmp_path: Path):
         for function in (read_messages, bag_topics):
             assert 'neither a file nor a folder' in complaint(function, path)
         rig = read_rig(CORPUS / 'rig' / 'velocity')
-        assert 'not a file' in complaint(lambda: read_samples(path, rig))  # noqa: B023
-        assert 'not a file' in complaint(lambda: read_yaml(path))  # noqa: B023
+        assert 'not a file' in complaint(lambda: read_samples(path, rig))  # noqa: B023  called at once
+        assert 'not a file' in complaint(lambda: read_yaml(path))  # noqa: B023  called at once
 
 
 def test_a_name_that_would_act_on_a_terminal_is_refused(tmp_path: Path):

@@ -254,7 +254,7 @@ class Axis(SpunNodes):
 
         if not self.spin_until(is_steady):
             raise RuntimeError(f'no force: {self.received[-1:]}; {(self.folder / "log").read_text()[-2000:]}')
-        self.spin(random.uniform(0.0, 0.05))  # noqa: S311
+        self.spin(random.uniform(0.0, 0.05))  # noqa: S311  no secret
 
     def time_to_zero(self, since: Callable[[], int]) -> TimeToZero:
         """Time from ``since()`` [ns] until 0 N, and no other force for `QUIET`."""

@@ -15,7 +15,7 @@ the two directions, as the thesis evaluates Tables A-1 to A-3. All numbers are o
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 from seal_friction_ros.core.estimation.friction_filter import (
     COULOMB_PRIOR,
@@ -69,8 +69,6 @@ class AdaptationSettings:
     Raises:
         ValueError: A setting is out of bounds, or the mode is unknown.
     """
-
-    COMPILED: ClassVar = ('moving_mass', 'acceleration_max', 'scale_min', 'scale_max')
 
     mode: str = parameter(
         'observe',

@@ -31,6 +31,7 @@ from seal_friction_ros.core.estimation.messages import (
     TICK_TYPE,
     VELOCITY_TYPE,
     Layout,
+    head_size,
 )
 from seal_friction_ros.core.estimation.pipeline import (
     PipelineParameters,
@@ -53,14 +54,21 @@ from seal_friction_ros.core.estimation.records import (
     Temperature,
     Velocity,
     WatchdogTick,
+    numbers_in,
 )
-from seal_friction_ros.core.foundation.compiled import INNER, compiled, for_compiler
+from seal_friction_ros.core.foundation.compiled import (
+    INNER,
+    closed,
+    compiled,
+    for_compiler,
+    from_compiler,
+    opened,
+)
 
 LATEST = 1 << 61  # [ns] stamps up to here, as messages have them: differences fit into 64 bits
 
-_FORCE, _PRESSURE, _REFERENCE, _TEMPERATURE, _TICK, _VELOCITY = (
-    int(kind) for kind in (Kind.FORCE, Kind.PRESSURE, Kind.REFERENCE, Kind.TEMPERATURE, Kind.TICK, Kind.VELOCITY)
-)
+_FORCE, _PRESSURE, _REFERENCE = int(Kind.FORCE), int(Kind.PRESSURE), int(Kind.REFERENCE)
+_TEMPERATURE, _TICK, _VELOCITY = int(Kind.TEMPERATURE), int(Kind.TICK), int(Kind.VELOCITY)
 _LAYOUTS = {layout.message_type: layout for layout in LAYOUTS}
 _INPUT_TYPES = {
     _FORCE: FORCE_TYPE,
@@ -90,15 +98,27 @@ class Answers(NamedTuple):
     feedforward_sizes: Integers
 
 
-class _Outbox(NamedTuple):
-    """Where compiled code puts answers: three views of the same bytes, and where each answer is in them."""
+class _Room(NamedTuple):
+    """The bytes of the answers, in three views."""
 
-    small: Any
-    words: Any
-    numbers: Any
+    small: Any  # bytes
+    words: Any  # uint32
+    numbers: Any  # float64
+
+
+class _Places(NamedTuple):
+    """Where each answer is in its room."""
+
     offsets: Any  # of the estimate and the feed-forward to each message, shape (2, n); likewise
     sizes: Any
     cursor: Any  # [bytes] used so far, shape (1,)
+
+
+class _Outbox(NamedTuple):
+    """Where compiled code puts answers."""
+
+    room: _Room
+    places: _Places
     row: Any  # an answer as numbers, shape (16,)
     data: Any  # the messages, whose stamps and frame names the answers take over
     message_offsets: Any
@@ -111,13 +131,13 @@ def receive_all(
 
     Args:
         parameters: Settings and seals.
-        state: From `pipeline.init`, a snapshot, or the messages before.
+        state: From `pipeline.init`, a snapshot, or the messages before; it stays as it is.
         messages: At most `MOST_MESSAGES`, which bounds memory; those that are no input are passed over.
 
     Raises:
         UnsuitedError: A message is not of its kind, a stamp is out of bounds, or an answer is not finite.
     """
-    if not _fits(state):
+    if not all(map(_fits, numbers_in(state))):
         raise UnsuitedError('a whole number in the state')
     wrong, room = _check(*messages)
     if wrong >= 0:
@@ -125,30 +145,25 @@ def receive_all(
     small = np.zeros(room, np.uint8)
     places = np.zeros((2, 2, len(messages.kinds)), np.int64)
     outbox = _Outbox(
-        small,
-        small.view(np.uint32),
-        small.view(np.float64),
-        places[0],
-        places[1],
-        np.zeros(1, np.int64),
-        np.zeros(16),
-        messages.data,
-        messages.offsets,
+        room=_Room(small, small.view(np.uint32), small.view(np.float64)),
+        places=_Places(places[0], places[1], np.zeros(1, np.int64)),
+        row=np.zeros(16),
+        data=messages.data,
+        message_offsets=messages.offsets,
     )
-    state, wrong = _receive_all(
-        for_compiler(parameters), state, messages.kinds, messages.received, messages.sent, outbox
+    record, wrong = _receive_all(
+        for_compiler(parameters), for_compiler(state), messages.kinds, messages.received, messages.sent, outbox
     )
     if wrong >= 0:
         raise UnsuitedError(f'an answer to message {wrong} is not finite')
     (estimates, feedforwards), (estimate_sizes, feedforward_sizes) = places
-    return state, Answers(small, estimates, estimate_sizes, feedforwards, feedforward_sizes)
+    answers = Answers(small, estimates, estimate_sizes, feedforwards, feedforward_sizes)
+    return from_compiler(PipelineState, record), answers
 
 
-def _fits(value: Any) -> bool:
-    """Whether all whole numbers are small enough, so that differences do not leave 64 bits."""
-    if isinstance(value, tuple):
-        return all(map(_fits, value))
-    return isinstance(value, float) or value == NEVER or abs(value) <= LATEST
+def _fits(number: Any) -> bool:
+    """Whether a whole number is small enough, so that differences do not leave 64 bits."""
+    return isinstance(number, float) or number == NEVER or abs(number) <= LATEST
 
 
 # -- compiled ---------------------------------------------------------------------------------------------------------
@@ -178,10 +193,7 @@ def _numbers(data: Bytes, offset: int, count: int) -> tuple[float, float, float]
     return first, second, third
 
 
-@compiled
-def _head_size(frame_length: int) -> int:
-    """As `messages.head_size`."""
-    return (12 + frame_length + 7) // 8 * 8
+_head_size = compiled(head_size)
 
 
 @compiled
@@ -225,10 +237,10 @@ def _check(
 
 @compiled
 def _receive_all(
-    parameters: Any, state: PipelineState, kinds: Bytes, receipts: Integers, sent: Integers, outbox: Any
-) -> tuple[PipelineState, int]:
-    """The pass; the number of the first message whose answer is not finite, or -1."""
-    data, message_offsets, cursor = outbox.data, outbox.message_offsets, outbox.cursor
+    parameters: Any, before: Any, kinds: Bytes, receipts: Integers, sent: Integers, outbox: Any
+) -> tuple[Any, int]:
+    """The pass: the next state, and the number of the first message whose answer is not finite, or -1."""
+    state, data, message_offsets, cursor = opened(before), outbox.data, outbox.message_offsets, outbox.places.cursor
     for i in range(len(kinds)):
         kind = kinds[i]
         if not _FORCE <= kind <= _VELOCITY:
@@ -239,21 +251,21 @@ def _receive_all(
         stamp = _stamp(data, offset)
         first, second, third = _numbers(data, body, _NUMBERS[kind])
         if kind == _VELOCITY:
-            state = receive_velocity(parameters, state, Velocity(stamp, first, i), received, since, outbox)
+            receive_velocity(parameters, state, Velocity(stamp, first, i), received, since, outbox)
         elif kind == _PRESSURE:
-            state = receive_pressure(parameters, state, Pressure(stamp, first, second), received, since, outbox)
+            receive_pressure(parameters, state, Pressure(stamp, first, second), received, since, outbox)
         elif kind == _FORCE:
-            state = receive_force(parameters, state, Force(stamp, first), received, since, outbox)
+            receive_force(parameters, state, Force(stamp, first), received, since, outbox)
         elif kind == _TEMPERATURE:
-            state = receive_temperature(parameters, state, Temperature(stamp, first, second), received, since, outbox)
+            receive_temperature(parameters, state, Temperature(stamp, first, second), received, since, outbox)
         elif kind == _TICK:
-            state = receive_tick(parameters, state, WatchdogTick(stamp, first, i), received, since, outbox)
+            receive_tick(parameters, state, WatchdogTick(stamp, first, i), received, since, outbox)
         else:
             wanted = ServoReference(stamp, first, second, third, i)
-            state = receive_reference(parameters, state, wanted, received, since, outbox)
+            receive_reference(parameters, state, wanted, received, since, outbox)
         if cursor[0] < 0:
-            return state, i
-    return state, -1
+            return before, i
+    return closed(state), -1
 
 
 @overload(send, jit_options=INNER)
@@ -297,8 +309,10 @@ def _writer(layout: Layout) -> Any:
         Stamp and frame name are those of the message; the name ends in a zero byte, whatever its last byte was. The
         numbers that follow are aligned to 8 bytes.
         """
-        small, words, numbers, answer_offsets, answer_sizes, cursor, row, data, message_offsets = outbox
-        slot, offset = cursor[0], message_offsets[number]
+        small, words, numbers = outbox.room
+        answer_offsets, answer_sizes, cursor = outbox.places
+        row, data = outbox.row, outbox.data
+        slot, offset = cursor[0], outbox.message_offsets[number]
         small[slot + 5] = 1  # encapsulation
         for k in range(8):
             small[slot + 8 + k] = data[offset + 4 + k]

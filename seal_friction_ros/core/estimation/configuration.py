@@ -15,7 +15,7 @@ from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.estimator import DEFAULT_ADAPTATION, EstimatorParameters, EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, init
-from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.estimation.records import Force, Pressure, field_names, numbers_in
 from seal_friction_ros.core.foundation.documents import parse_json
 from seal_friction_ros.core.foundation.parameters import check, from_mapping, meanings, parameter
 from seal_friction_ros.core.friction.actuator import MountedSeal
@@ -307,34 +307,27 @@ def _state(configuration: Configuration, document: Any, version: int) -> Pipelin
     """
     if version != ALGORITHM_VERSION:
         pressure, force = _parsed(Pressure, document['pressure']), _parsed(Force, document['force'])
-        return init(configuration.parameters())._replace(
-            pressure=pressure, force=force, refused=bool(document['refused'])
-        )
+        first = init(configuration.parameters())
+        return dataclasses.replace(first, pressure=pressure, force=force, refused=bool(document['refused']))
     state: PipelineState = _parsed(PipelineState, document)
     computed = state.estimator, state.feedforward, state.friction, state.reference, state.temperature
-    if not all(map(_is_finite, computed)):
+    if not all(math.isfinite(number) for record in computed for number in numbers_in(record)):
         raise ValueError('configuration: a number in the state is not finite')
     return state
 
 
-def _is_finite(value: Any) -> bool:
-    return all(map(_is_finite, value)) if isinstance(value, tuple) else math.isfinite(value)
-
-
 def _encoded_record(value: Any) -> Any:
-    """Named tuples as mappings, whole numbers as they are, others as hexadecimal text."""
-    if isinstance(value, tuple) and hasattr(value, '_asdict'):
-        return {name: _encoded_record(field) for name, field in value._asdict().items()}
-    return float(value).hex() if isinstance(value, float) else int(value)
+    """Records as mappings, whole numbers as they are, others as hexadecimal text."""
+    names = field_names(value)
+    if names:
+        return {name: _encoded_record(getattr(value, name)) for name in names}
+    return value.hex() if isinstance(value, float) else int(value)
 
 
-def _parsed(record_type: Any, document: Any) -> Any:
-    """Named tuple: inverse of `_encoded_record`, with the declared type of each field."""
-    hints = get_type_hints(record_type)
-    return record_type(**{name: _field(hints[name], document[name]) for name in record_type._fields})
-
-
-def _field(kind: Any, value: Any) -> Any:
-    if hasattr(kind, '_fields'):
-        return _parsed(kind, value)
-    return float.fromhex(value) if kind is float else kind(int(value))
+def _parsed(kind: Any, value: Any) -> Any:
+    """Record or number: inverse of `_encoded_record`, with the declared type of each field."""
+    if kind in (int, bool):
+        return kind(int(value))
+    if kind is float:
+        return float.fromhex(value)
+    return kind(**{name: _parsed(hint, value[name]) for name, hint in get_type_hints(kind).items()})

@@ -1,14 +1,16 @@
 """The estimator, the same online and offline.
 
-``state = init(parameters)``, then ``state, estimate = step(parameters, state, sample)`` at every velocity sample.
+``state = init(parameters)``, then ``state, estimate = step(parameters, state, sample)`` at every velocity sample. The
+state is one mutable record of small immutable ones: each stage takes and returns its own.
 
 Time is the stamp of the samples: the same samples give the same estimates, live or replayed.
 """
 
 import dataclasses
 import math
-from dataclasses import dataclass, field
-from typing import ClassVar, NamedTuple
+from dataclasses import dataclass, field, fields
+from operator import attrgetter
+from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation.adaptation import (
     LARGEST_INERTIA,
@@ -34,6 +36,7 @@ from seal_friction_ros.core.estimation.conditioned_velocity import (
 )
 from seal_friction_ros.core.estimation.hidden_motion import NO_HIDDEN_MOTION, Apparent, HiddenMotion, with_sample
 from seal_friction_ros.core.estimation.records import (
+    BITS,
     EXTRAPOLATED,
     NEVER,
     NO_FORCE,
@@ -43,7 +46,6 @@ from seal_friction_ros.core.estimation.records import (
     Pressure,
     RodSample,
     SealTemperature,
-    Status,
 )
 from seal_friction_ros.core.estimation.sheared_seals import (
     NOT_FOLLOWED,
@@ -196,23 +198,6 @@ class EstimatorParameters:
         ValueError: There is no seal, or two seals have different corrections of the force sum or temperature parts.
     """
 
-    COMPILED: ClassVar = (
-        'settings',
-        'seal_numbers',
-        'depends_on_velocity',
-        'corrects_force_sum',
-        'force_sum_correction',
-        'limits_motion',
-        'motion_limits',
-        'elasticity',
-        'followed_elasticity',
-        'adaptation',
-        'adapts',
-        'uses_scale',
-        'has_temperature_scale',
-        'temperature_scale',
-    )
-
     settings: EstimatorSettings
     seals: tuple[MountedSeal, ...]
     adaptation: AdaptationSettings = DEFAULT_ADAPTATION
@@ -305,22 +290,30 @@ class Speed(NamedTuple):
 NO_SPEED = Speed(NEVER, 0.0)
 
 
-class EstimatorState(NamedTuple):
+@dataclass(slots=True)
+class EstimatorState:
     """What one step leaves for the next."""
 
-    stamp: int  # [ns] of the last velocity sample; `NEVER` before the first
-    at_rest: bool
-    pressure: Pressure  # last usable pressure
-    force: Force  # last usable force sum
-    velocity: Speed  # last usable velocity
-    leapt_pressure: Pressure  # newest pressure, if it jumped away from the last usable one
-    leapt_force: Force  # likewise
-    leapt_velocity: Speed  # likewise
-    motion: ConditionedVelocity  # of the usable velocities
+    stamp: int = NEVER  # [ns] of the last velocity sample; `NEVER` before the first
+    at_rest: bool = False
+    pressure: Pressure = NO_PRESSURE  # last usable pressure
+    force: Force = NO_FORCE  # last usable force sum
+    velocity: Speed = NO_SPEED  # last usable velocity
+    leapt_pressure: Pressure = NO_PRESSURE  # newest pressure, if it jumped away from the last usable one
+    leapt_force: Force = NO_FORCE  # likewise
+    leapt_velocity: Speed = NO_SPEED  # likewise
+    motion: ConditionedVelocity = NOT_CONDITIONED  # of the usable velocities
     adaptation: AdaptationState = NOT_ADAPTED
     shear: FollowedShear = NOT_FOLLOWED
     swing: Swing = NO_SWING
     hidden: HiddenMotion = NO_HIDDEN_MOTION
+
+    def copy(self) -> 'EstimatorState':
+        """The same state, which does not change with this one."""
+        return EstimatorState(*_VALUES(self))
+
+
+_VALUES = attrgetter(*(one.name for one in fields(EstimatorState)))
 
 
 class Observation(NamedTuple):
@@ -336,45 +329,16 @@ class Observation(NamedTuple):
 def init(parameters: EstimatorParameters) -> EstimatorState:
     """State before the first sample: no inputs, the rod counts as moving."""
     del parameters
-    return EstimatorState(
-        NEVER, False, NO_PRESSURE, NO_FORCE, NO_SPEED, NO_PRESSURE, NO_FORCE, NO_SPEED, NOT_CONDITIONED
-    )
+    return EstimatorState()
 
 
-# Status bits as plain integers: IntFlag arithmetic costs a microsecond each time.
-_PRESSURE_MISSING = int(Status.PRESSURE_MISSING)
-_FORCE_MISSING = int(Status.FORCE_MISSING)
-_PRESSURE_STALE = int(Status.PRESSURE_STALE)
-_FORCE_STALE = int(Status.FORCE_STALE)
-_PRESSURE_NOT_FINITE = int(Status.PRESSURE_NOT_FINITE)
-_FORCE_NOT_FINITE = int(Status.FORCE_NOT_FINITE)
-_VELOCITY_NOT_FINITE = int(Status.VELOCITY_NOT_FINITE)
-_PRESSURE_OUT_OF_RANGE = int(Status.PRESSURE_OUT_OF_RANGE)
-_FORCE_OUT_OF_RANGE = int(Status.FORCE_OUT_OF_RANGE)
-_VELOCITY_OUT_OF_RANGE = int(Status.VELOCITY_OUT_OF_RANGE)
-_OUTSIDE_IDENTIFIED_RANGE = int(Status.OUTSIDE_IDENTIFIED_RANGE)
-_STAMP_NOT_INCREASING = int(Status.STAMP_NOT_INCREASING)
-_PRESSURE_LEAP = int(Status.PRESSURE_LEAP)
-_FORCE_LEAP = int(Status.FORCE_LEAP)
-_VELOCITY_LEAP = int(Status.VELOCITY_LEAP)
-_INPUT_REFUSED = int(Status.INPUT_REFUSED)
-_STAMP_AGE = int(Status.STAMP_AGE)
-_LATE_INPUT = int(Status.LATE_INPUT)
-_MOTION_UNCERTAIN = int(Status.MOTION_UNCERTAIN)
-_FASTER_THAN_IDENTIFIED = int(Status.FASTER_THAN_IDENTIFIED)
-_SLOWER_THAN_IDENTIFIED = int(Status.SLOWER_THAN_IDENTIFIED)
-_DIRECTION_NOT_IDENTIFIED = int(Status.DIRECTION_NOT_IDENTIFIED)
-_FORCE_CONTAINS_LOAD = int(Status.FORCE_CONTAINS_LOAD)
-_MODEL_DISAGREES = int(Status.MODEL_DISAGREES)
-_TEMPERATURE_MISSING = int(Status.TEMPERATURE_MISSING)
-_OUTSIDE_IDENTIFIED_TEMPERATURE = int(Status.OUTSIDE_IDENTIFIED_TEMPERATURE)
-_PRESLIDING = int(Status.PRESLIDING)
 _EXTRAPOLATED = int(EXTRAPOLATED)
-
-NO_VELOCITY = _VELOCITY_NOT_FINITE | _VELOCITY_OUT_OF_RANGE | _VELOCITY_LEAP
+NO_VELOCITY = BITS.VELOCITY_NOT_FINITE | BITS.VELOCITY_OUT_OF_RANGE | BITS.VELOCITY_LEAP
 """Status bits of a velocity that is not used."""
-_NO_STATE = NO_VELOCITY | _INPUT_REFUSED | _PRESSURE_MISSING
-_NO_FORCE_SUM = _FORCE_MISSING | _FORCE_STALE | _FORCE_CONTAINS_LOAD
+_NO_AGE = BITS.PRESSURE_MISSING | BITS.FORCE_MISSING
+_NO_STATE = NO_VELOCITY | BITS.INPUT_REFUSED | BITS.PRESSURE_MISSING
+_NO_FORCE_SUM = BITS.FORCE_MISSING | BITS.FORCE_STALE | BITS.FORCE_CONTAINS_LOAD
+_NO_READING = _NO_STATE | _NO_FORCE_SUM
 _NO_FRICTION = ActuatorFriction(0.0, 0.0, 0.0, True, 0.0)
 _UNKNOWN = StateFriction(UNKNOWN, 0, 0.0)
 
@@ -383,7 +347,6 @@ SETTLING_TIME = 0.01  # [s] our choice: in this time the way of a sliding rod ex
 SHORTEST_INTERVAL = 1e-3  # [s] our choice: over less, noise exceeds any rate, and some drivers stamp no finer
 
 
-@compilable
 def step(
     parameters: EstimatorParameters, state: EstimatorState, sample: RodSample
 ) -> tuple[EstimatorState, FrictionEstimate]:
@@ -391,20 +354,22 @@ def step(
 
     Args:
         parameters: Settings and seals.
-        state: From `init` or the step before.
+        state: From `init` or the step before; it stays as it is.
         sample: Velocity sample with the newest pressure and force sum.
 
     Returns:
         The next state and the estimate, every number of which is finite.
     """
-    state, estimate, seen, friction = estimate_at(parameters, state, sample)
-    return learn_from(parameters, state, estimate, seen, friction), estimate
+    state = state.copy()
+    estimate, seen, friction = estimate_at(parameters, state, sample)
+    state.adaptation = learn_from(parameters, state.adaptation, estimate, seen, friction)
+    return state, estimate
 
 
 @compilable
 def estimate_at(
-    parameters: EstimatorParameters, state: EstimatorState, sample: RodSample
-) -> tuple[EstimatorState, FrictionEstimate, Observation, ActuatorFriction]:
+    parameters: Any, state: EstimatorState, sample: RodSample
+) -> tuple[FrictionEstimate, Observation, ActuatorFriction]:
     """Estimate the friction of the seals at one rod-velocity sample by what was learnt before.
 
     A pressure or force sum that is not finite, out of range, or jumps is never used: the last usable one stays in use
@@ -418,68 +383,63 @@ def estimate_at(
 
     Args:
         parameters: Settings and seals.
-        state: From `init` or the step before.
+        state: From `init` or the step before; it becomes the next state, but for what `learn_from` learns.
         sample: Velocity sample with the newest pressure and force sum.
 
     Returns:
-        The state before it learns, the estimate, every number of which is finite, and what else `learn_from` takes.
+        The estimate, every number of which is finite, and what else `learn_from` takes.
 
     Source: thesis, chapter 7 (Figures 20 and 21); what is done with unusable inputs is our choice.
     """
-    last_stamp = state.stamp
-    state, seen = assess_inputs(parameters, state, sample)
-    friction = _NO_FRICTION
-    if not seen.status & _PRESSURE_MISSING:
-        pressure = state.pressure
-        friction = friction_of_seals(parameters.seal_numbers, pressure.chamber_a, pressure.chamber_b, seen.velocity)
+    elapsed = (sample.stamp - state.stamp) * 1e-9
+    seen, friction = assess_inputs(parameters, state, sample), _NO_FRICTION
+    velocity, pressure = seen.velocity, state.pressure
+    if pressure.stamp != NEVER:
+        friction = friction_of_seals(parameters.seal_numbers, pressure.chamber_a, pressure.chamber_b, velocity)
     if parameters.has_temperature_scale:
         seen, friction = _at_seal_temperature(parameters, seen, friction, sample.temperature)
     if parameters.adapts:
         adapted, estimate = _estimate_with_learnt(parameters, state.adaptation, seen, friction)
     else:
         adapted, estimate = friction, estimate_of(parameters, seen, friction, 1.0, 0.0, 0.0, 0.0)
-    state, estimate = _with_sheared_seals(
-        parameters.adaptation, parameters.followed_elasticity, state, seen, adapted, estimate
+    state.shear, estimate = _with_sheared_seals(
+        parameters, parameters.followed_elasticity, state, seen, adapted, estimate
     )
-    elapsed = (seen.stamp - last_stamp) * 1e-9
-    state, estimate = _with_hidden_motion(parameters.settings, state, seen, elapsed, friction, estimate)
-    if seen.velocity != 0.0:
-        state, estimate = _with_swing(state, seen, elapsed, estimate)
-    return state, estimate, seen, friction
+    if not estimate.status & _NO_READING:
+        hidden, swing, measured = state.hidden, state.swing, state.velocity.velocity
+        if measured * velocity <= 0.0 or hidden.speed > 0.0 or hidden.doubt > 0.0:
+            moment = Apparent(elapsed, measured, velocity, seen.force_sum, friction.coulomb_friction)
+            state.hidden = with_sample(hidden, moment, parameters.settings.slip_velocity)
+        is_short = abs(swing.way) <= LONGEST_SWING or (velocity > 0.0) != (swing.way > 0.0)
+        if velocity != 0.0 and (is_short or swing.doubted > 0.0):
+            state.swing = swing_on(swing, elapsed, velocity, seen.force_sum, estimate.friction_force)
+        if state.hidden.doubt > 0.0 or (velocity != 0.0 and state.swing.doubted > 0.0):
+            estimate = replace(estimate, status=estimate.status | BITS.MOTION_UNCERTAIN)
+    return estimate, seen, friction
 
 
 @compilable
 def learn_from(
-    parameters: EstimatorParameters,
-    state: EstimatorState,
-    estimate: FrictionEstimate,
-    seen: Observation,
-    friction: ActuatorFriction,
-) -> EstimatorState:
-    """State after learning from a sample, if adaptation is on and the sample is due.
+    parameters: Any, known: AdaptationState, estimate: FrictionEstimate, seen: Observation, friction: ActuatorFriction
+) -> AdaptationState:
+    """What is learnt after a sample: if adaptation is on and the sample is due.
 
     Args:
         parameters: Settings and seals.
-        state: From `estimate_at`, like the other arguments.
-        estimate: Of this sample.
+        known: What was learnt before.
+        estimate: Of this sample, from `estimate_at`, like the other arguments.
         seen: The sample after the checks.
         friction: By the seal files.
     """
-    stamp, velocity, force_sum, _, _ = seen
-    if not parameters.adapts or not is_due(state.adaptation, stamp):
-        return state
-    status = estimate.status & ~_MODEL_DISAGREES
+    if not parameters.adapts or not is_due(known, seen.stamp):
+        return known
+    status = estimate.status & ~BITS.MODEL_DISAGREES
     slide = Slide(
-        stamp,
-        velocity,
-        force_sum,
-        friction.coulomb_friction + friction.velocity_friction,
-        friction.coulomb_friction_std,
-        estimate.state == BREAKAWAY,
-        not status & ~_EXTRAPOLATED,
-        status == 0,
-    )
-    return replace(state, adaptation=adapt(parameters.adaptation, state.adaptation, slide))
+        stamp=seen.stamp, velocity=seen.velocity, force_sum=seen.force_sum,
+        friction=friction.coulomb_friction + friction.velocity_friction, friction_std=friction.coulomb_friction_std,
+        is_pressed=estimate.state == BREAKAWAY, is_usable=not status & ~_EXTRAPOLATED, is_identified=status == 0,
+    )  # fmt: skip
+    return adapt(parameters.adaptation, known, slide)
 
 
 @compilable
@@ -490,105 +450,66 @@ def temperature_in_use(law: TemperatureScale, temperature: SealTemperature) -> f
 
 @compilable
 def _at_seal_temperature(
-    parameters: EstimatorParameters, seen: Observation, friction: ActuatorFriction, temperature: SealTemperature
+    parameters: Any, seen: Observation, friction: ActuatorFriction, temperature: SealTemperature
 ) -> tuple[Observation, ActuatorFriction]:
     """Friction at the temperature of the seals, and status bits if that is old or outside the identified ones.
 
     An old temperature stays in use, since a seal warms up in minutes and a step back to the reference would be a step
     of the force (our choice); the standard deviation then holds any of the identified temperatures.
     """
-    stamp, velocity, force_sum, status, input_age = seen
     law = parameters.temperature_scale
     kelvin = temperature_in_use(law, temperature)
     fault = 0
-    if temperature.stamp == NEVER or abs(stamp - temperature.stamp) * 1e-9 > parameters.settings.temperature_timeout:
-        fault |= _TEMPERATURE_MISSING
+    age = abs(seen.stamp - temperature.stamp) * 1e-9
+    if temperature.stamp == NEVER or age > parameters.settings.temperature_timeout:
+        fault |= BITS.TEMPERATURE_MISSING
     if not is_identified_at(law, kelvin):
-        fault |= _OUTSIDE_IDENTIFIED_TEMPERATURE
+        fault |= BITS.OUTSIDE_IDENTIFIED_TEMPERATURE
     friction = at_temperature(friction, law, kelvin)
     if fault:
         friction = at_unknown_temperature(friction, law)
-    return Observation(stamp, velocity, force_sum, status | fault, input_age), friction
+    return replace(seen, status=seen.status | fault), friction
 
 
 @compilable
 def _estimate_with_learnt(
-    parameters: EstimatorParameters, known: AdaptationState, seen: Observation, friction: ActuatorFriction
+    parameters: Any, known: AdaptationState, seen: Observation, friction: ActuatorFriction
 ) -> tuple[ActuatorFriction, FrictionEstimate]:
     """Friction and estimate by what was learnt before this sample."""
-    settings, uses = parameters.adaptation, parameters.uses_scale
-    stamp, velocity, force_sum, status, input_age = seen
-    moment = moment_of(known, friction, stamp, velocity, force_sum)
+    settings, uses, learnt, status = parameters.adaptation, parameters.uses_scale, known.filter, seen.status
+    moment = moment_of(known, friction, seen.stamp, seen.velocity, seen.force_sum)
     adapted, taken_off = adapted_friction(settings, known, friction, moment, uses)
     if disagrees(settings, known, friction, moment, uses):
-        status |= _MODEL_DISAGREES
+        status |= BITS.MODEL_DISAGREES
     left = 0.0
-    if velocity != 0.0 and not status & (_NO_STATE | _NO_FORCE_SUM):
-        left = left_over(settings, known, force_sum)
+    if seen.velocity != 0.0 and not status & _NO_READING:
+        left = left_over(settings, known, seen.force_sum)
         if not is_consistent(settings, known, left - moment.direction * moment.found):
-            status |= _MODEL_DISAGREES
+            status |= BITS.MODEL_DISAGREES
         left -= moment.direction * (adapted.coulomb_friction + adapted.velocity_friction)
-    scale = learnt_scale(settings, known.filter)
     scale_std = friction.coulomb_friction_std / moment.law if moment.law > 0.0 else 0.0
-    if known.filter.stamp != NEVER:
-        scale_std = known.filter.friction_std / known.filter.friction
-    seen = Observation(stamp, velocity, force_sum - taken_off, status, input_age)
-    offset = offset_here(known) + known.filter.terms.remainder
-    return adapted, estimate_of(parameters, seen, adapted, scale, scale_std, offset, left)
-
-
-@compilable
-def _with_hidden_motion(
-    settings: EstimatorSettings,
-    state: EstimatorState,
-    seen: Observation,
-    elapsed: float,
-    friction: ActuatorFriction,
-    estimate: FrictionEstimate,
-) -> tuple[EstimatorState, FrictionEstimate]:
-    """Estimate, marked as uncertain if what counts as ripple of the velocity is a motion."""
-    known, measured = state.hidden, state.velocity.velocity
-    is_denied = measured * seen.velocity <= 0.0 or known.speed > 0.0 or known.doubt > 0.0
-    if not is_denied or estimate.status & (_NO_STATE | _NO_FORCE_SUM):
-        return state, estimate
-    moment = Apparent(elapsed, measured, seen.velocity, seen.force_sum, friction.coulomb_friction)
-    known = with_sample(known, moment, settings.slip_velocity)
-    if known.doubt > 0.0:
-        estimate = replace(estimate, status=estimate.status | _MOTION_UNCERTAIN)
-    return replace(state, hidden=known), estimate
-
-
-@compilable
-def _with_swing(
-    state: EstimatorState, seen: Observation, elapsed: float, estimate: FrictionEstimate
-) -> tuple[EstimatorState, FrictionEstimate]:
-    """Estimate of a sliding rod, marked as uncertain if the force sum does not show its swings."""
-    known, velocity = state.swing, seen.velocity
-    if known.doubted == 0.0 and abs(known.way) > LONGEST_SWING and (velocity > 0.0) == (known.way > 0.0):
-        return state, estimate  # most samples of a motion
-    if estimate.status & (_NO_STATE | _NO_FORCE_SUM):
-        return state, estimate
-    known = swing_on(known, elapsed, velocity, seen.force_sum, estimate.friction_force)
-    if known.doubted > 0.0:
-        estimate = replace(estimate, status=estimate.status | _MOTION_UNCERTAIN)
-    return replace(state, swing=known), estimate
+    if learnt.stamp != NEVER:
+        scale_std = learnt.friction_std / learnt.friction
+    offset = offset_here(known) + learnt.terms.remainder
+    seen = replace(seen, force_sum=seen.force_sum - taken_off, status=status)
+    return adapted, estimate_of(parameters, seen, adapted, learnt_scale(settings, learnt), scale_std, offset, left)
 
 
 @compilable
 def _with_sheared_seals(
-    settings: AdaptationSettings,
+    parameters: Any,
     elasticity: FollowedElasticity | None,
     state: EstimatorState,
     seen: Observation,
     friction: ActuatorFriction,
     estimate: FrictionEstimate,
-) -> tuple[EstimatorState, FrictionEstimate]:
+) -> tuple[FollowedShear, FrictionEstimate]:
     """Estimate with the friction of seals that shear, while the rod moves and just after; at rest as with rigid seals.
 
     Without a usable velocity or pressure the seals are not followed: over a short gap the way counts.
 
     Args:
-        settings: With the moving mass; the acceleration is that of adaptation.
+        parameters: With the moving mass.
         elasticity: Of the seals; None: rigid.
         state: With the shear of the sample before.
         seen: The sample.
@@ -596,123 +517,121 @@ def _with_sheared_seals(
         estimate: With rigid seals.
     """
     if elasticity is None:
-        return state, estimate
-    stamp, coulomb, std, breakaway, force, acting, direction, status, age, scale, scale_std, offset, left = estimate
-    if status & _NO_STATE:
-        return state, estimate
-    known, shear, measured, moves = state.adaptation, state.shear, state.velocity.velocity, sign(seen.velocity)
-    slides_on = False
+        return state.shear, estimate
+    if estimate.status & _NO_STATE:
+        return state.shear, estimate
+    shear, measured, moves, slides_on = state.shear, state.velocity.velocity, sign(seen.velocity), False
     if moves != 0:
         slides_on, shear = slide_on(
-            elasticity, shear, stamp, measured, moves, NEVER, coulomb, friction.velocity_friction
+            elasticity, shear, seen.stamp, measured, moves, NEVER, friction.coulomb_friction, friction.velocity_friction
         )
     if slides_on:
-        sheared = ShearedFriction(True, shear.fully_sheared, 0.0, True)
+        sheared = ShearedFriction(is_followed=True, force=shear.fully_sheared, std=0.0, slides=True)
     else:
-        inertia = settings.moving_mass * known.acceleration
-        moment = Moment(
-            stamp,
-            measured,
-            moves,
-            seen.force_sum - offset - inertia,
-            not status & _NO_FORCE_SUM,
-            settings.moving_mass > 0.0 and abs(inertia) <= LARGEST_INERTIA * coulomb and known.stamp != NEVER,
-            coulomb,
-            friction.velocity_friction,
-            breakaway - coulomb,
-        )
+        moment = _moment_of_seals(parameters.adaptation, state.adaptation, measured, seen, friction, estimate)
         shear, sheared = shear_on(elasticity, shear, moment)
-    if sheared.is_followed and acting != UNKNOWN and not (slides_on and sheared.force == force):  # else as it is
-        if left != 0.0:  # 0.0: adaptation is off, or there is no residual of this sample
-            left += force - sheared.force
-        force, std = sheared.force, math.sqrt(std * std + sheared.std * sheared.std)
-        if seen.velocity == 0.0:
-            direction = sign(force)
-        if seen.velocity == 0.0 or not sheared.slides:
-            status |= _PRESLIDING
-        estimate = FrictionEstimate(
-            stamp, coulomb, std, breakaway, force, acting, direction, status, age, scale, scale_std, offset, left
-        )
-    return replace(state, shear=shear), estimate
+    is_as_rigid = slides_on and sheared.force == estimate.friction_force
+    if is_as_rigid or not sheared.is_followed or estimate.state == UNKNOWN:
+        return shear, estimate
+    return shear, _with_shear(estimate, sheared, seen.velocity)
 
 
 @compilable
-def assess_inputs(
-    parameters: EstimatorParameters, state: EstimatorState, sample: RodSample
-) -> tuple[EstimatorState, Observation]:
+def _moment_of_seals(
+    settings: AdaptationSettings,
+    known: AdaptationState,
+    measured: float,
+    seen: Observation,
+    friction: ActuatorFriction,
+    estimate: FrictionEstimate,
+) -> Moment:
+    """A sample as seals that shear take it, less what is known not to be friction."""
+    inertia, coulomb = settings.moving_mass * known.acceleration, friction.coulomb_friction
+    is_small = abs(inertia) <= LARGEST_INERTIA * coulomb
+    return Moment(
+        stamp=seen.stamp, velocity=measured, direction=sign(seen.velocity),
+        force_sum=seen.force_sum - estimate.adaptation_offset - inertia,
+        knows_force_sum=not estimate.status & _NO_FORCE_SUM,
+        knows_inertia=settings.moving_mass > 0.0 and is_small and known.stamp != NEVER, coulomb_friction=coulomb,
+        velocity_friction=friction.velocity_friction, stiction=estimate.breakaway_force - coulomb,
+    )  # fmt: skip
+
+
+@compilable
+def _with_shear(estimate: FrictionEstimate, sheared: ShearedFriction, velocity: float) -> FrictionEstimate:
+    """Estimate with the friction of sheared seals; 0.0 as residual: there is none of this sample."""
+    std, left, status, direction = estimate.coulomb_friction_std, estimate.residual, estimate.status, estimate.direction
+    if left != 0.0:
+        left += estimate.friction_force - sheared.force
+    if velocity == 0.0:
+        direction = sign(sheared.force)
+    if velocity == 0.0 or not sheared.slides:
+        status |= BITS.PRESLIDING
+    return replace(
+        estimate, coulomb_friction_std=math.sqrt(std * std + sheared.std * sheared.std), friction_force=sheared.force,
+        direction=direction, status=status, residual=left,
+    )  # fmt: skip
+
+
+@compilable
+def assess_inputs(parameters: Any, state: EstimatorState, sample: RodSample) -> Observation:
     """First half of a step: choose the inputs in use, flag their faults, decide whether the rod moves.
 
     The force sum is checked as measured, since its limits are those of a sensor, then corrected with the
     pressure in use.
     """
-    # One unpacking takes a quarter of the time of an attribute each.
-    stamp, given, newest_pressure, newest_force, refused, stamp_age, _, is_late = sample
-    last_stamp, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion, _, _, _, _ = (
-        state
-    )
     settings = parameters.settings
-    status = _INPUT_REFUSED if refused else 0
+    stamp, last_stamp = sample.stamp, state.stamp
+    status = BITS.INPUT_REFUSED if sample.refused else 0
     if last_stamp != NEVER and stamp <= last_stamp:
-        status |= _STAMP_NOT_INCREASING
-    if abs(stamp_age) > settings.stamp_age_max > 0.0:
-        status |= _STAMP_AGE
-    if is_late:
-        status |= _LATE_INPUT
-
-    pressure, leapt_pressure, fault = _usable_pressure(settings, newest_pressure, pressure, leapt_pressure)
+        status |= BITS.STAMP_NOT_INCREASING
+    if abs(sample.stamp_age) > settings.stamp_age_max > 0.0:
+        status |= BITS.STAMP_AGE
+    if sample.is_late:
+        status |= BITS.LATE_INPUT
+    state.stamp = stamp
+    state.pressure, state.leapt_pressure, fault = _usable_pressure(
+        settings, sample.pressure, state.pressure, state.leapt_pressure
+    )
     status |= fault
-    force, leapt_force, fault = _usable_force(settings, newest_force, force, leapt_force)
+    state.force, state.leapt_force, fault = _usable_force(settings, sample.force, state.force, state.leapt_force)
     status |= fault
-    pressure_age = 0.0 if pressure.stamp == NEVER else (stamp - pressure.stamp) * 1e-9
-    force_age = 0.0 if force.stamp == NEVER else (stamp - force.stamp) * 1e-9
+    pressure_age = 0.0 if state.pressure.stamp == NEVER else (stamp - state.pressure.stamp) * 1e-9
+    force_age = 0.0 if state.force.stamp == NEVER else (stamp - state.force.stamp) * 1e-9
     if abs(pressure_age) > settings.pressure_timeout:
-        status |= _PRESSURE_STALE
+        status |= BITS.PRESSURE_STALE
     if abs(force_age) > settings.force_timeout:
-        status |= _FORCE_STALE
+        status |= BITS.FORCE_STALE
     input_age = pressure_age if pressure_age >= force_age else force_age
-    if status & (_PRESSURE_MISSING | _FORCE_MISSING):
+    if status & _NO_AGE:
         input_age = -1.0
-    force_sum = _force_sum_on_rod(parameters, force, pressure)
+    force_sum = _force_sum_on_rod(parameters, state.force, state.pressure)
 
-    velocity, leapt_velocity, fault = _usable_velocity(settings, Speed(stamp, given), velocity, leapt_velocity)
+    newest, velocity = Speed(stamp, sample.velocity), 0.0
+    state.velocity, state.leapt_velocity, fault = _usable_velocity(
+        settings, newest, state.velocity, state.leapt_velocity
+    )
     status |= fault
-    sliding_velocity = 0.0
     if not fault:
-        motion = condition_velocity(motion, stamp, given, settings.velocity_resolution)
-        at_rest = is_at_rest(motion.velocity, at_rest, settings.stick_velocity, settings.slip_velocity)
-        uncertain = _is_uncertain(settings, motion, at_rest)
+        motion = condition_velocity(state.motion, stamp, sample.velocity, settings.velocity_resolution)
+        at_rest = is_at_rest(motion.velocity, state.at_rest, settings.stick_velocity, settings.slip_velocity)
+        state.motion, state.at_rest, uncertain = motion, at_rest, _is_uncertain(settings, motion, at_rest)
         if uncertain:
-            status |= _MOTION_UNCERTAIN
+            status |= BITS.MOTION_UNCERTAIN
         # Friction never drives: a rod in the band of rest that moves against the force sum slides; a load hides that.
         drives = motion.velocity * force_sum < 0.0 and not parameters.force_sum_correction.contains_load
         if not at_rest or (uncertain and drives):
-            sliding_velocity = motion.velocity
-    state = EstimatorState(  # `replace` of nine fields costs 3 us a sample
-        stamp,
-        at_rest,
-        pressure,
-        force,
-        velocity,
-        leapt_pressure,
-        leapt_force,
-        leapt_velocity,
-        motion,
-        state.adaptation,
-        state.shear,
-        state.swing,
-        state.hidden,
-    )
-    return state, Observation(stamp, sliding_velocity, force_sum, status, input_age)
+            velocity = motion.velocity
+    return Observation(stamp, velocity, force_sum, status, input_age)
 
 
 @compilable
-def _force_sum_on_rod(parameters: EstimatorParameters, force: Force, pressure: Pressure) -> float:
+def _force_sum_on_rod(parameters: Any, force: Force, pressure: Pressure) -> float:
     """Measured force sum, corrected [N]."""
     if not parameters.corrects_force_sum or force.stamp == NEVER:
         return force.force
-    found: float = corrected_force_sum(
-        parameters.force_sum_correction, force.force, pressure.chamber_a, pressure.chamber_b
-    )
+    correction = parameters.force_sum_correction
+    found: float = corrected_force_sum(correction, force.force, pressure.chamber_a, pressure.chamber_b)
     return found
 
 
@@ -721,30 +640,30 @@ def _unidentified_motion(limits: MotionLimits, velocity: float) -> int:
     """Status bits of sliding at ``velocity`` [m/s] that no seal file covers."""
     status, speed = 0, abs(velocity)
     if speed > limits.fastest:
-        status |= _FASTER_THAN_IDENTIFIED
+        status |= BITS.FASTER_THAN_IDENTIFIED
     if 0.0 < speed < limits.slowest:
-        status |= _SLOWER_THAN_IDENTIFIED
+        status |= BITS.SLOWER_THAN_IDENTIFIED
     if (velocity > 0.0 and not limits.extends) or (velocity < 0.0 and not limits.retracts):
-        status |= _DIRECTION_NOT_IDENTIFIED
+        status |= BITS.DIRECTION_NOT_IDENTIFIED
     return status
 
 
 @compilable
 def _is_uncertain(settings: EstimatorSettings, motion: ConditionedVelocity, at_rest: bool) -> bool:
     """Whether the velocity does not tell if the rod is at rest."""
-    _, velocity, half_width, _, _, is_waiting, last_velocity, last_change, _, _, _, _, samples = motion
+    velocity, half_width = motion.velocity, motion.half_width
     if at_rest:
         return abs(velocity) > CREEP * settings.stick_velocity
-    if samples < SETTLING:
+    if motion.samples < SETTLING:
         return True
     if half_width == 0.0:  # the first step of a motion may be a ripple that is not learnt yet
-        return velocity * (last_velocity - last_change) <= 0.0
-    return is_waiting or abs(velocity) <= settings.slip_velocity + half_width / SETTLING_TIME
+        return velocity * (motion.last_velocity - motion.last_change) <= 0.0
+    return motion.is_waiting or abs(velocity) <= settings.slip_velocity + half_width / SETTLING_TIME
 
 
 @compilable
 def estimate_of(
-    parameters: EstimatorParameters,
+    parameters: Any,
     seen: Observation,
     friction: ActuatorFriction,
     scale: float,
@@ -756,34 +675,24 @@ def estimate_of(
 
     ``scale``, ``scale_std``, ``offset`` and ``residual`` [N] are what adaptation adds to the estimate.
     """
-    stamp, velocity, force_sum, status, input_age = seen
-    coulomb, coulomb_std, stiction, in_identified_range, velocity_friction = friction
-    breakaway = coulomb + stiction if parameters.settings.use_stiction else coulomb
-    if not in_identified_range:
-        status |= _OUTSIDE_IDENTIFIED_RANGE
+    velocity, status, coulomb = seen.velocity, seen.status, friction.coulomb_friction
+    breakaway = coulomb + friction.stiction if parameters.settings.use_stiction else coulomb
+    if not friction.in_identified_range:
+        status |= BITS.OUTSIDE_IDENTIFIED_RANGE
     if parameters.limits_motion:
         status |= _unidentified_motion(parameters.motion_limits, velocity)
     acting, slides = _UNKNOWN, velocity != 0.0
     if not slides and parameters.force_sum_correction.contains_load:
-        status |= _FORCE_CONTAINS_LOAD
+        status |= BITS.FORCE_CONTAINS_LOAD
     if not status & _NO_STATE and (slides or not status & _NO_FORCE_SUM):
-        sliding = coulomb + velocity_friction
-        acting = state_friction(velocity, force_sum, not slides, sliding, breakaway)
+        sliding = coulomb + friction.velocity_friction
+        acting = state_friction(velocity, seen.force_sum, not slides, sliding, breakaway)
     return FrictionEstimate(
-        stamp,
-        coulomb,
-        coulomb_std,
-        breakaway,
-        acting.friction_force,
-        acting.state,
-        acting.direction,
-        status,
-        input_age,
-        scale,
-        scale_std,
-        offset,
-        residual,
-    )
+        stamp=seen.stamp, coulomb_friction=coulomb, coulomb_friction_std=friction.coulomb_friction_std,
+        breakaway_force=breakaway, friction_force=acting.friction_force, state=acting.state,
+        direction=acting.direction, status=status, input_age=seen.input_age, adaptation_scale=scale,
+        adaptation_scale_std=scale_std, adaptation_offset=offset, residual=residual,
+    )  # fmt: skip
 
 
 @compilable
@@ -795,10 +704,8 @@ def _largest_change(elapsed: int, largest_rate: float) -> float:
 
 @compilable
 def _pressure_leaps(settings: EstimatorSettings, newer: Pressure, older: Pressure) -> bool:
-    stamp, a, b = newer
-    older_stamp, older_a, older_b = older
-    most = _largest_change(stamp - older_stamp, settings.pressure_rate_max)
-    return abs(a - older_a) > most or abs(b - older_b) > most
+    most = _largest_change(newer.stamp - older.stamp, settings.pressure_rate_max)
+    return abs(newer.chamber_a - older.chamber_a) > most or abs(newer.chamber_b - older.chamber_b) > most
 
 
 @compilable
@@ -807,19 +714,19 @@ def _usable_pressure(
 ) -> tuple[Pressure, Pressure, int]:
     """Pressure to use, the pressure that jumped, and status bits."""
     stamp, a, b = newest
-    missing = _PRESSURE_MISSING if used.stamp == NEVER else 0
+    missing = BITS.PRESSURE_MISSING if used.stamp == NEVER else 0
     if stamp == NEVER:
         return used, leapt, missing
     lowest, highest = settings.pressure_min, settings.pressure_max
     if not (lowest <= a <= highest and lowest <= b <= highest):
         finite = math.isfinite(a) and math.isfinite(b)
-        return used, leapt, missing | (_PRESSURE_OUT_OF_RANGE if finite else _PRESSURE_NOT_FINITE)
+        return used, leapt, missing | (BITS.PRESSURE_OUT_OF_RANGE if finite else BITS.PRESSURE_NOT_FINITE)
     if missing or not _pressure_leaps(settings, newest, used):
         return newest, NO_PRESSURE, 0
     confirms = leapt.stamp not in (NEVER, stamp)
     if confirms and not _pressure_leaps(settings, newest, leapt):
         return newest, NO_PRESSURE, 0
-    return used, newest, _PRESSURE_LEAP
+    return used, newest, BITS.PRESSURE_LEAP
 
 
 @compilable
@@ -827,18 +734,18 @@ def _usable_force(settings: EstimatorSettings, newest: Force, used: Force, leapt
     """Force sum to use, the force sum that jumped, and status bits."""
     stamp, force = newest
     used_stamp, used_force = used
-    missing = _FORCE_MISSING if used_stamp == NEVER else 0
+    missing = BITS.FORCE_MISSING if used_stamp == NEVER else 0
     if stamp == NEVER:
         return used, leapt, missing
     if not abs(force) <= settings.force_max:
-        return used, leapt, missing | (_FORCE_OUT_OF_RANGE if math.isfinite(force) else _FORCE_NOT_FINITE)
+        return used, leapt, missing | (BITS.FORCE_OUT_OF_RANGE if math.isfinite(force) else BITS.FORCE_NOT_FINITE)
     fastest = settings.force_rate_max
     if missing or abs(force - used_force) <= _largest_change(stamp - used_stamp, fastest):
         return newest, NO_FORCE, 0
     confirms = leapt.stamp not in (NEVER, stamp)
     if confirms and abs(force - leapt.force) <= _largest_change(stamp - leapt.stamp, fastest):
         return newest, NO_FORCE, 0
-    return used, newest, _FORCE_LEAP
+    return used, newest, BITS.FORCE_LEAP
 
 
 @compilable
@@ -847,11 +754,11 @@ def _usable_velocity(settings: EstimatorSettings, newest: Speed, used: Speed, le
     stamp, velocity = newest
     used_stamp, used_velocity = used
     if not abs(velocity) <= settings.velocity_max:
-        return used, leapt, _VELOCITY_OUT_OF_RANGE if math.isfinite(velocity) else _VELOCITY_NOT_FINITE
+        return used, leapt, BITS.VELOCITY_OUT_OF_RANGE if math.isfinite(velocity) else BITS.VELOCITY_NOT_FINITE
     fastest = settings.acceleration_max
     if used_stamp == NEVER or abs(velocity - used_velocity) <= _largest_change(stamp - used_stamp, fastest):
         return newest, NO_SPEED, 0
     confirms = leapt.stamp not in (NEVER, stamp)
     if confirms and abs(velocity - leapt.velocity) <= _largest_change(stamp - leapt.stamp, fastest):
         return newest, NO_SPEED, 0
-    return used, newest, _VELOCITY_LEAP
+    return used, newest, BITS.VELOCITY_LEAP

@@ -282,30 +282,34 @@ def elastic_step(
         present: Wanted velocity without lead [m/s].
         led: From `led_velocity` [m/s].
     """
-    last_received, last_force, last_fade, last_friction, last_velocity, elements, last_led = state
-    elapsed = 0.0 if last_received == NEVER or received < last_received else (received - last_received) * 1e-9
+    elapsed = 0.0 if state.received == NEVER or received < state.received else (received - state.received) * 1e-9
     valid = friction >= 0.0 and not math.isnan(velocity)
     if not friction >= 0.0:
-        friction = last_friction
+        friction = state.friction
     if math.isnan(velocity):
-        velocity, present, led = last_velocity, last_velocity, last_led
+        velocity, present, led = state.velocity, state.velocity, state.led_velocity
     short = elapsed if elapsed < LONGEST_STEP else LONGEST_STEP
     change = short / settings.fade_time if valid else -elapsed / settings.fade_time
-    fade = between(0.0, last_fade + change, 1.0)
+    fade = between(0.0, state.fade + change, 1.0)
 
     limited = _FADE if fade < 1.0 or not valid else 0
     wanted = compensation(settings, friction, velocity)
-    elements, friction_force = _sheared(settings, elasticity, elements, 0.5 * (last_led + led) * short, friction)
+    way = 0.5 * (state.led_velocity + led) * short
+    elements, friction_force = _sheared(settings, elasticity, state.elements, way, friction)
     if not math.isnan(friction_force):
         wanted = elastic_compensation(settings, friction_force, present)
     clamped = between(-settings.force_limit, wanted, settings.force_limit)
     if clamped != wanted:
         limited |= _CLAMP
     most = settings.slew_limit * short
-    force = between(last_force - most, clamped, last_force + most)
+    force = between(state.force - most, clamped, state.force + most)
     if force != clamped:
         limited |= _SLEW
     if settings.scale == 0.0:
         force = 0.0
-    feedforward = FeedForward(stamp, fade * force + 0.0, settings.scale * fade, limited)
-    return FeedForwardState(received, force, fade, friction, velocity, elements, led), feedforward
+    feedforward = FeedForward(stamp=stamp, force=fade * force + 0.0, scale=settings.scale * fade, limited=limited)
+    state = FeedForwardState(
+        received=received, force=force, fade=fade, friction=friction, velocity=velocity, elements=elements,
+        led_velocity=led,
+    )  # fmt: skip
+    return state, feedforward

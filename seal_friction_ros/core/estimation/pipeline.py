@@ -1,7 +1,8 @@
 """The path of every message: what comes in, what is kept of it, what goes out. The same for the node and for replay.
 
-``state = init(parameters)``, then ``state = receive(parameters, state, message, received, emit)`` for every message,
-in order of receipt. The node passes a function that publishes, replay one that collects.
+``state = init(parameters)``, then ``receive(parameters, state, message, received, emit)`` for every message, in order
+of receipt. The node passes a function that publishes, replay one that collects. The state of an actuator is one mutable
+record of small immutable ones; each stage takes and returns its own. Who may have to go back keeps a ``state.copy()``.
 
 A velocity sample makes an estimate with the newest pressure and force sum, and, once there has been a reference, a
 feed-forward. The estimate is emitted before anything is learnt from its sample, and before the feed-forward is
@@ -20,8 +21,11 @@ Inputs with several publishers are refused, since nobody knows which publisher i
 that everybody sees it, but the estimates are marked and the feed-forward fades out.
 """
 
+import dataclasses
 import math
 from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation import estimator
@@ -102,7 +106,8 @@ class Reference(NamedTuple):
 NO_REFERENCE = Reference(NOT_CONDITIONED, 0.0, 0.0)
 
 
-class ReceiptTimes(NamedTuple):
+@dataclass(slots=True)
+class ReceiptTimes:
     """When the last new sample of each input was sent that was in time [ns]; `NEVER` before the first."""
 
     velocity: int = NEVER
@@ -119,20 +124,27 @@ class Turn(NamedTuple):
     after: EstimatorState
 
 
-class PipelineState(NamedTuple):
+@dataclass(slots=True)
+class PipelineState:
     """What one message leaves for the next, the newest inputs among it."""
 
     estimator: EstimatorState
-    feedforward: FeedForwardState
+    feedforward: FeedForwardState = FADED_OUT
     friction: float = -1.0  # [N] of the newest usable estimate; negative: the newest is not usable
     pressure: Pressure = NO_PRESSURE
     force: Force = NO_FORCE
     reference: Reference = NO_REFERENCE
-    receipt: ReceiptTimes = ReceiptTimes()
+    receipt: ReceiptTimes = field(default_factory=ReceiptTimes)
     refused: bool = False  # whether no input may act: one has several publishers, or the node is stopping
     clock_offset: int = 0  # [ns] what the clock of the stamps shows after the clock of receipt
     temperature: SealTemperature = NO_TEMPERATURE
     clock: int = NEVER  # [ns] newest simulated time
+
+    def copy(self) -> 'PipelineState':
+        """The same state, which does not change with this one."""
+        copied = PipelineState(*_VALUES(self))
+        copied.estimator, copied.receipt = self.estimator.copy(), ReceiptTimes(*_TIMES(self.receipt))
+        return copied
 
     def turn_since(self, before: 'PipelineState') -> Turn | None:
         """The end of a stroke between the state before a message and this one, if the adaptation learns from it."""
@@ -142,17 +154,19 @@ class PipelineState(NamedTuple):
         return Turn(before.estimator, self.estimator)
 
 
+_VALUES, _TIMES = (attrgetter(*(one.name for one in fields(kind))) for kind in (PipelineState, ReceiptTimes))
+
+
 def init(parameters: PipelineParameters) -> PipelineState:
     """State before the first message."""
-    return PipelineState(estimator.init(parameters.estimator), FADED_OUT)
+    return PipelineState(estimator.init(parameters.estimator))
 
 
 def init_running(parameters: PipelineParameters) -> PipelineState:
     """State of a simulation that shall begin without fade and settling."""
     known = NOT_CONDITIONED._replace(samples=SETTLING)
-    state = init(parameters)
-    running = state.estimator._replace(motion=known)
-    return state._replace(estimator=running, feedforward=FADED_IN, reference=NO_REFERENCE._replace(velocity=known))
+    running = dataclasses.replace(estimator.init(parameters.estimator), motion=known)
+    return PipelineState(running, FADED_IN, reference=NO_REFERENCE._replace(velocity=known))
 
 
 def receive(
@@ -162,34 +176,33 @@ def receive(
     received: int,
     emit: Emit,
     sent: int | None = None,
-) -> PipelineState:
+) -> None:
     """Take one message.
 
     Args:
         parameters: Settings and seals.
-        state: From `init` or the message before.
+        state: From `init` or of the message before; it becomes the next state.
         message: As `messages.decode` makes it; its values may be anything.
         received: When it was received [ns].
         emit: Called with each estimate and feed-forward that the message makes; every number in them is finite.
         sent: When its publisher sent it [ns], on the clock of ``received``; None: just then.
-
-    Returns:
-        The next state.
     """
     since = acting_since(parameters.feedforward, received, received if sent is None else sent)
-    return _RECEIVERS[type(message)](parameters, state, message, received, since, emit)
+    _RECEIVERS[type(message)](parameters, state, message, received, since, emit)
 
 
 def answered(
     parameters: PipelineParameters, state: PipelineState, message: Input, received: int, sent: int | None = None
 ) -> tuple[PipelineState, list[tuple[str, bytes]]]:
-    """`receive` with the answers collected: message type and bytes of each, in the order they are emitted."""
+    """The next state, and the answers: message type and bytes of each, in the order they are emitted; see `receive`."""
     answers: list[tuple[str, bytes]] = []
 
     def collect(record: Output, frame_id: bytes) -> None:
         answers.append((type_of(record), encode(record, frame_id)))
 
-    return receive(parameters, state, message, received, collect, sent), answers
+    state = state.copy()
+    receive(parameters, state, message, received, collect, sent)
+    return state, answers
 
 
 def send(emit: Any, record: Any, frame_id: Any) -> None:
@@ -211,72 +224,54 @@ def acting_since(settings: FeedForwardSettings, received: int, sent: int) -> int
 
 
 @compilable
-def receive_velocity(
-    parameters: Any, state: PipelineState, velocity: Any, received: int, since: int, emit: Any
-) -> PipelineState:
+def receive_velocity(parameters: Any, state: Any, velocity: Any, received: int, since: int, emit: Any) -> None:
     """An estimate, and with a reference a feed-forward."""
-    known, guided, _, pressure, force, reference, receipt, refused, offset, temperature, clock = state
-    stamp, given, frame_id = velocity
-    is_new = known.stamp != stamp
-    is_late = since == NEVER or _stands_still(clock, receipt, received, parameters.feedforward.estimate_timeout)
-    age = (received + offset - stamp) * 1e-9
-    sample = RodSample(stamp, given, pressure, force, refused, age, temperature, is_late)
-    known, estimate, seen, friction_by_law = estimate_at(parameters.estimator, known, sample)
-    send(emit, estimate, frame_id)
-    known = learn_from(parameters.estimator, known, estimate, seen, friction_by_law)
+    settings, stamp, made = parameters.feedforward, velocity.stamp, state.feedforward.received
+    is_new = state.estimator.stamp != stamp
+    sample = RodSample(
+        stamp=stamp, velocity=velocity.velocity, pressure=state.pressure, force=state.force, refused=state.refused,
+        stamp_age=(received + state.clock_offset - stamp) * 1e-9, temperature=state.temperature,
+        is_late=since == NEVER or _stands_still(state.clock, state.receipt, received, settings.estimate_timeout),
+    )  # fmt: skip
+    estimate, seen, friction = estimate_at(parameters.estimator, state.estimator, sample)
+    send(emit, estimate, velocity.frame_id)
+    known = state.estimator.adaptation
+    state.estimator.adaptation = learn_from(parameters.estimator, known, estimate, seen, friction)
     if is_new and since != NEVER and not estimate.status & NO_VELOCITY:
-        receipt = ReceiptTimes(since, receipt.pressure, receipt.force, receipt.reference, receipt.clock)
-    friction = estimate.coulomb_friction if usable(parameters.feedforward, estimate) else -1.0
-    state = PipelineState(
-        known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature, clock
-    )
-    if receipt.reference == NEVER and not parameters.feedforward.use_measured_velocity:
-        return state
-    if since == NEVER and guided.received != NEVER and received - guided.received < TICK_INTERVAL:
-        return state
-    return _feed_forward(parameters, state, stamp, received, frame_id, emit)
+        state.receipt.velocity = since
+    state.friction = estimate.coulomb_friction if usable(settings, estimate) else -1.0
+    is_guided = state.receipt.reference != NEVER or settings.use_measured_velocity
+    is_soon = since == NEVER and made != NEVER and received - made < TICK_INTERVAL
+    if is_guided and not is_soon:
+        _feed_forward(parameters, state, stamp, received, velocity.frame_id, emit)
 
 
 @compilable
-def receive_pressure(
-    _parameters: Any, state: PipelineState, newest: Pressure, _received: int, since: int, _emit: Any
-) -> PipelineState:
+def receive_pressure(_parameters: Any, state: Any, pressure: Pressure, _received: int, since: int, _emit: Any) -> None:
     """Keep the pressure for the next velocity sample."""
-    known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature, clock = state
-    if newest.stamp != pressure.stamp and since != NEVER:
-        receipt = ReceiptTimes(receipt.velocity, since, receipt.force, receipt.reference, receipt.clock)
-    return PipelineState(
-        known, guided, friction, newest, force, reference, receipt, refused, offset, temperature, clock
-    )
+    if pressure.stamp != state.pressure.stamp and since != NEVER:
+        state.receipt.pressure = since
+    state.pressure = pressure
 
 
 @compilable
-def receive_force(
-    parameters: Any, state: PipelineState, newest: Force, _received: int, since: int, _emit: Any
-) -> PipelineState:
+def receive_force(parameters: Any, state: Any, force: Force, _received: int, since: int, _emit: Any) -> None:
     """Keep the force sum for the next velocity sample."""
-    known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature, clock = state
-    in_range = abs(newest.force) <= parameters.estimator.settings.force_max
-    if newest.stamp != force.stamp and since != NEVER and in_range:
-        receipt = ReceiptTimes(receipt.velocity, receipt.pressure, since, receipt.reference, receipt.clock)
-    return PipelineState(
-        known, guided, friction, pressure, newest, reference, receipt, refused, offset, temperature, clock
-    )
+    in_range = abs(force.force) <= parameters.estimator.settings.force_max
+    if force.stamp != state.force.stamp and since != NEVER and in_range:
+        state.receipt.force = since
+    state.force = force
 
 
 @compilable
-def receive_reference(
-    parameters: Any, state: PipelineState, wanted: Any, _received: int, since: int, _emit: Any
-) -> PipelineState:
+def receive_reference(parameters: Any, state: Any, wanted: Any, _received: int, since: int, _emit: Any) -> None:
     """Condition the reference and keep it for the next velocity sample; one that is not possible is no new sample."""
-    known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature, clock = state
-    if wanted.stamp != reference.velocity.stamp and is_possible(parameters.estimator.settings, wanted):
-        reference = condition_reference(reference, wanted)
-        if since != NEVER:
-            receipt = ReceiptTimes(receipt.velocity, receipt.pressure, receipt.force, since, receipt.clock)
-    return PipelineState(
-        known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature, clock
-    )
+    is_new = wanted.stamp != state.reference.velocity.stamp
+    if not is_new or not is_possible(parameters.estimator.settings, wanted):
+        return
+    state.reference = condition_reference(state.reference, wanted)
+    if since != NEVER:
+        state.receipt.reference = since
 
 
 @compilable
@@ -286,60 +281,59 @@ def is_possible(settings: EstimatorSettings, wanted: Any) -> bool:
     return is_slow and not abs(wanted.acceleration) > settings.acceleration_max
 
 
-def receive_clock(state: PipelineState, newest: Clock, received: int, since: int) -> PipelineState:
+def receive_clock(_parameters: Any, state: PipelineState, newest: Clock, received: int, since: int, _emit: Any) -> None:
     """Follow simulated time; one that stands still gets old."""
-    receipt = state.receipt
     if newest.stamp != state.clock and since != NEVER:
-        receipt = receipt._replace(clock=since)
-    return state._replace(clock=newest.stamp, clock_offset=newest.stamp - received, receipt=receipt)
+        state.receipt.clock = since
+    state.clock, state.clock_offset = newest.stamp, newest.stamp - received
 
 
 @compilable
 def receive_temperature(
-    parameters: Any, state: PipelineState, newest: Temperature, _received: int, _since: int, _emit: Any
-) -> PipelineState:
-    """Keep the median of three temperatures for the next velocity sample; one that no rubber seal has is no sample.
-
-    After a pause longer than the timeout the three begin anew: the older ones say nothing of now.
-    """
-    known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature, clock = state
-    kelvin = newest.temperature + ZERO_CELSIUS
-    if COLDEST <= kelvin <= HOTTEST and newest.stamp != temperature.newest_stamp:
-        stamp, used, last_stamp, last, before = temperature
-        if abs(newest.stamp - last_stamp) * 1e-9 > parameters.estimator.settings.temperature_timeout:
-            last, before = 0.0, 0.0
-        if before > 0.0:
-            lower, higher = (last, before) if last < before else (before, last)
-            stamp, used = newest.stamp, between(lower, kelvin, higher)
-        temperature = SealTemperature(stamp, used, newest.stamp, kelvin, last)
-    return PipelineState(
-        known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature, clock
-    )
+    parameters: Any, state: Any, newest: Temperature, _received: int, _since: int, _emit: Any
+) -> None:
+    """Keep the median of three temperatures for the next velocity sample; one that no rubber seal has is no sample."""
+    state.temperature = _median(state.temperature, newest, parameters.estimator.settings.temperature_timeout)
 
 
 @compilable
-def receive_tick(
-    parameters: Any, state: PipelineState, tick: Any, received: int, _since: int, emit: Any
-) -> PipelineState:
+def _median(known: SealTemperature, newest: Temperature, timeout: float) -> SealTemperature:
+    """Median of the last three temperatures.
+
+    After a pause longer than the timeout [s] the three begin anew: the older ones say nothing of now.
+    """
+    kelvin = newest.temperature + ZERO_CELSIUS
+    if not COLDEST <= kelvin <= HOTTEST or newest.stamp == known.newest_stamp:
+        return known
+    stamp, used, last, before = known.stamp, known.kelvin, known.newest, known.before
+    if abs(newest.stamp - known.newest_stamp) * 1e-9 > timeout:
+        last, before = 0.0, 0.0
+    if before > 0.0:
+        lower, higher = (last, before) if last < before else (before, last)
+        stamp, used = newest.stamp, between(lower, kelvin, higher)
+    return SealTemperature(stamp=stamp, kelvin=used, newest_stamp=newest.stamp, newest=kelvin, before=last)
+
+
+@compilable
+def receive_tick(parameters: Any, state: Any, tick: Any, received: int, _since: int, emit: Any) -> None:
     """A feed-forward without a velocity sample, which fades once an input is too old."""
-    return _feed_forward(parameters, state, tick.stamp, received, tick.frame_id, emit)
+    _feed_forward(parameters, state, tick.stamp, received, tick.frame_id, emit)
 
 
 def receive_position(
-    _parameters: Any, state: PipelineState, _position: Position, _received: int, _since: int, _emit: Any
-) -> PipelineState:
+    _parameters: Any, _state: PipelineState, _position: Position, _received: int, _since: int, _emit: Any
+) -> None:
     """Nothing depends on the position; it is recorded to show how the servo tracks."""
-    return state
 
 
-_RECEIVERS: dict[type, Callable[[Any, PipelineState, Any, int, int, Any], PipelineState]] = {
+_RECEIVERS: dict[type, Callable[[Any, PipelineState, Any, int, int, Any], None]] = {
     Velocity: receive_velocity,
     Pressure: receive_pressure,
     Force: receive_force,
     ServoReference: receive_reference,
     Position: receive_position,
     Temperature: receive_temperature,
-    Clock: lambda _parameters, state, clock, received, since, _emit: receive_clock(state, clock, received, since),
+    Clock: receive_clock,
     WatchdogTick: receive_tick,
 }
 
@@ -362,56 +356,51 @@ def condition_reference(reference: Reference, wanted: Any) -> Reference:
     Two accelerations in a row of the same sign count with the smaller magnitude, others as 0: the difference of a
     rounded velocity alternates, that of a clean one does not.
     """
-    last_velocity, smoothed, last = reference
-    velocity = condition_velocity(last_velocity, wanted.stamp, wanted.velocity, 0.0)
+    last = reference.last_acceleration
+    velocity = condition_velocity(reference.velocity, wanted.stamp, wanted.velocity, 0.0)
     given = 0.0 if math.isnan(wanted.acceleration) else wanted.acceleration
     agreed = 0.0
     if given * last > 0.0:
         agreed = given if abs(given) < abs(last) else last
     acceleration = agreed
-    if velocity.half_width > 0.0 and velocity.smoothing > 0.0 and last_velocity.stamp != NEVER:
-        step = abs(wanted.stamp - last_velocity.stamp) * 1e-9
+    if velocity.half_width > 0.0 and velocity.smoothing > 0.0 and reference.velocity.stamp != NEVER:
+        step = abs(wanted.stamp - reference.velocity.stamp) * 1e-9
         share = step / (step + ACCELERATION_SMOOTHING * velocity.smoothing)
-        acceleration = smoothed + share * (agreed - smoothed)
-    return Reference(velocity, acceleration, given)
+        acceleration = reference.acceleration + share * (agreed - reference.acceleration)
+    return Reference(velocity=velocity, acceleration=acceleration, last_acceleration=given)
 
 
 @compilable
-def _feed_forward(
-    parameters: Any, state: PipelineState, stamp: int, received: int, frame_id: Any, emit: Any
-) -> PipelineState:
+def _feed_forward(parameters: Any, state: Any, stamp: int, received: int, frame_id: Any, emit: Any) -> None:
     """Make and emit the feed-forward of this moment."""
-    known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature, clock = state
-    settings = parameters.feedforward
-    present, acceleration = _reference_motion(settings, known, reference)
+    settings, receipt, made = parameters.feedforward, state.receipt, state.feedforward
+    present, acceleration = _reference_motion(settings, state.estimator.motion, state.reference)
     is_wanted = settings.use_measured_velocity or _is_younger(receipt.reference, received, settings.reference_timeout)
-    turns = present * guided.velocity <= 0.0 and guided.velocity != 0.0
+    turns = present * made.velocity <= 0.0 and made.velocity != 0.0
     if not is_wanted and not turns:
         present = math.nan  # the force fades as it is
     velocity = led = present
     if not settings.use_measured_velocity:
         velocity = wanted_velocity(settings, present, acceleration)
         led = led_velocity(settings, present, acceleration)
-    ground = friction
-    is_fresh = _is_fresh(receipt, received, settings.estimate_timeout)
-    if refused or not is_fresh or _stands_still(clock, receipt, received, settings.estimate_timeout):
+    ground, timeout = state.friction, settings.estimate_timeout
+    if state.refused or not _is_fresh(receipt, received, timeout):
+        ground = -1.0
+    if _stands_still(state.clock, receipt, received, timeout):
         ground = -1.0
     if turns and not is_wanted:  # a reference that came late: the force fades on its side
         ground = -1.0
     if ground >= 0.0 and not math.isnan(velocity):
-        ground = _friction_at(parameters.estimator, known, temperature, ground, velocity)
+        ground = _friction_at(parameters.estimator, state.estimator, state.temperature, ground, velocity)
     elasticity = parameters.estimator.elasticity
-    guided, compensation = elastic_step(settings, elasticity, guided, stamp, received, ground, velocity, present, led)
-    send(emit, compensation, frame_id)
-    return PipelineState(
-        known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature, clock
+    state.feedforward, newest = elastic_step(
+        settings, elasticity, made, stamp, received, ground, velocity, present, led
     )
+    send(emit, newest, frame_id)
 
 
 @compilable
-def _friction_at(
-    parameters: Any, known: EstimatorState, temperature: SealTemperature, coulomb: float, velocity: float
-) -> float:
+def _friction_at(parameters: Any, known: Any, temperature: SealTemperature, coulomb: float, velocity: float) -> float:
     """Friction at a wanted velocity [N], >= 0, from the Coulomb friction of the newest estimate [N]."""
     learns = parameters.uses_scale and is_proven(known.adaptation.filter)
     if not (learns or parameters.depends_on_velocity):
@@ -431,14 +420,14 @@ def _friction_at(
 
 @compilable
 def _reference_motion(
-    settings: FeedForwardSettings, known: EstimatorState, reference: Reference
+    settings: FeedForwardSettings, motion: ConditionedVelocity, reference: Reference
 ) -> tuple[float, float]:
     """Conditioned velocity [m/s] and acceleration [m/s^2] of the newest reference, late or not, or of the rod.
 
     With ``use_measured_velocity`` they are the rod's, its acceleration 0.
     """
     if settings.use_measured_velocity:
-        return confirmed_velocity(known.motion), 0.0
+        return confirmed_velocity(motion), 0.0
     given = reference.velocity
     velocity, acceleration = confirmed_velocity(given), 0.0
     if given.samples >= SETTLING and (velocity != 0.0 or given.half_width == 0.0):  # noise at rest is no start
@@ -447,16 +436,15 @@ def _reference_motion(
 
 
 @compilable
-def _is_fresh(receipt: ReceiptTimes, received: int, timeout: float) -> bool:
+def _is_fresh(receipt: Any, received: int, timeout: float) -> bool:
     """Whether every input of the estimator that ever came has come within ``timeout`` [s]."""
-    velocity, pressure, force, _, _ = receipt
-    if force != NEVER and not _is_younger(force, received, timeout):
+    if receipt.force != NEVER and not _is_younger(receipt.force, received, timeout):
         return False
-    return _is_younger(velocity, received, timeout) and _is_younger(pressure, received, timeout)
+    return _is_younger(receipt.velocity, received, timeout) and _is_younger(receipt.pressure, received, timeout)
 
 
 @compilable
-def _stands_still(clock: int, receipt: ReceiptTimes, received: int, timeout: float) -> bool:
+def _stands_still(clock: int, receipt: Any, received: int, timeout: float) -> bool:
     """Whether there is simulated time and it has not moved for ``timeout`` [s], or never did."""
     return clock != NEVER and not _is_younger(receipt.clock, received, timeout)
 

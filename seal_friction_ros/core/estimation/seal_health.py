@@ -38,7 +38,8 @@ def with_sample(starts: Starts, estimate: FrictionEstimate) -> Starts:
     The friction of a start is force sum less offset and inertia: friction force plus residual. The last estimate at
     rest counts, too: the force is largest just before the rod moves.
     """
-    resting_since, began, largest, number, mean, squares = starts
+    resting_since, began, largest = starts.resting_since, starts.began, starts.largest
+    number, mean, squares = starts.number, starts.mean, starts.squares
     coulomb = estimate.coulomb_friction
     seen = abs(estimate.friction_force + estimate.residual) / coulomb if coulomb > 0.0 else 0.0
     if estimate.state != SLIDING:

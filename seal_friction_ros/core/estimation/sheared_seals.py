@@ -134,45 +134,51 @@ def shear_on(
         state: `NOT_FOLLOWED` or the state before.
         moment: The sample.
     """
-    last_stamp, last_velocity, period, seals, softer, is_known, last_direction, rest_since, full, way_back, alike = (
-        state
-    )
-    stamp, velocity, direction, _, knows_force_sum, knows_inertia, coulomb, velocity_friction, _ = moment
-    elapsed = (stamp - last_stamp) * 1e-9 if last_stamp != NEVER else 0.0
-    way = 0.5 * (last_velocity + velocity) * elapsed + way_back
-    if last_stamp == NEVER:
-        full = direction * between(0.0, coulomb + velocity_friction, math.inf)
-        seals = Shear(NO_ELEMENTS, velocity_friction)
-    elif not 0.0 <= elapsed <= _longest_gap(period):
+    stamp, coulomb = moment.stamp, moment.coulomb_friction
+    seals, softer, full = state.seals, state.softer, state.fully_sheared
+    is_known, last_direction = state.is_known, state.direction
+    elapsed = (stamp - state.stamp) * 1e-9 if state.stamp != NEVER else 0.0
+    way = 0.5 * (state.velocity + moment.velocity) * elapsed + state.way_back
+    if state.stamp == NEVER:
+        full = moment.direction * between(0.0, coulomb + moment.velocity_friction, math.inf)
+        seals = Shear(NO_ELEMENTS, moment.velocity_friction)
+    elif not 0.0 <= elapsed <= _longest_gap(state.elapsed):
         is_known, last_direction, way = False, 0, 0.0
     elapsed = between(0.0, elapsed, LONGEST_GAP)
-    rest_since, direction = _rest(stamp, direction, rest_since, last_direction)
-    bears = rest_since != NEVER and knows_inertia and knows_force_sum
+    rest_since, direction = _rest(stamp, moment.direction, state.rest_since, last_direction)
+    bears = rest_since != NEVER and moment.knows_inertia and moment.knows_force_sum
     if rest_since != NEVER and not bears:
         slides_on, further = slide_on(
-            elasticity, state, stamp, velocity, direction, rest_since, coulomb, velocity_friction
+            elasticity, state, stamp, moment.velocity, direction, rest_since, coulomb, moment.velocity_friction
         )
         if slides_on:
-            return further, ShearedFriction(True, further.fully_sheared, 0.0, True)
+            return further, ShearedFriction(is_followed=True, force=further.fully_sheared, std=0.0, slides=True)
     seals, softer = _with_elements(elasticity, seals, softer, full)
+    alike = state.rests_alike
     if rest_since == stamp:
         alike = _are_alike(seals, softer, EQUAL * coulomb)
+    full, sheared = 0.0, AT_REST
     if direction == 0:
         seals = _held(elasticity.seals, seals, moment, elapsed)
         softer = _held(elasticity.softer, softer, moment, elapsed)
-        is_known = is_known and knows_force_sum and knows_inertia and alike
-        return FollowedShear(stamp, velocity, elapsed, seals, softer, is_known, 0, rest_since, 0.0, 0.0, alike), AT_REST
-    if not is_known and direction != last_direction:
-        softer = _sheared_against(elasticity.softer, moment, direction)
-    seals, softer, sheared = _moved(elasticity, seals, softer, Slide(way, elapsed, *moment[6:]), direction)
-    if bears:
-        seals = _held(elasticity.seals, seals, moment, 0.0)
-        sheared = _bearing(seals, softer)
-    is_known, full = is_known or sheared.slides, 0.0
-    if sheared.slides and abs(sheared.force) == coulomb + seals.excess and sheared.std <= EQUAL * abs(sheared.force):
-        full, seals = sheared.force, Shear(NO_ELEMENTS, seals.excess)
-        softer = seals
-    state = FollowedShear(stamp, velocity, elapsed, seals, softer, is_known, direction, rest_since, full, 0.0, alike)
+        is_known = is_known and moment.knows_force_sum and moment.knows_inertia and alike
+    else:
+        if not is_known and direction != last_direction:
+            softer = _sheared_against(elasticity.softer, moment, direction)
+        slide = Slide(way, elapsed, coulomb, moment.velocity_friction, moment.stiction)
+        seals, softer, sheared = _moved(elasticity, seals, softer, slide, direction)
+        if bears:
+            seals = _held(elasticity.seals, seals, moment, 0.0)
+            sheared = _bearing(seals, softer)
+        is_known = is_known or sheared.slides
+        is_exact = abs(sheared.force) == coulomb + seals.excess and sheared.std <= EQUAL * abs(sheared.force)
+        if sheared.slides and is_exact:
+            full, seals = sheared.force, Shear(NO_ELEMENTS, seals.excess)
+            softer = seals
+    state = FollowedShear(
+        stamp=stamp, velocity=moment.velocity, elapsed=elapsed, seals=seals, softer=softer, is_known=is_known,
+        direction=direction, rest_since=rest_since, fully_sheared=full, way_back=0.0, rests_alike=alike,
+    )  # fmt: skip
     return state, sheared
 
 
@@ -199,13 +205,13 @@ def slide_on(
         coulomb: Coulomb friction [N].
         velocity_friction: What sliding adds to it [N].
     """
-    last_stamp, last_velocity, period, seals, _, is_known, _, _, full, way_back, _ = state
-    if not is_known or full * direction <= 0.0:
+    seals, full = state.seals, state.fully_sheared
+    if not state.is_known or full * direction <= 0.0:
         return False, state
-    elapsed = (stamp - last_stamp) * 1e-9
-    if not (0.0 <= elapsed <= SHORT_GAP or SHORT_GAP < elapsed <= _longest_gap(period)):
+    elapsed = (stamp - state.stamp) * 1e-9
+    if not (0.0 <= elapsed <= SHORT_GAP or SHORT_GAP < elapsed <= _longest_gap(state.elapsed)):
         return False, state
-    way = (0.5 * (last_velocity + velocity) * elapsed + way_back) * direction
+    way = (0.5 * (state.velocity + velocity) * elapsed + state.way_back) * direction
     excess, way_left = seals.excess, way
     if way > 0.0:
         way_left, memory_length = 0.0, elasticity.seals.memory_length
@@ -220,10 +226,10 @@ def slide_on(
         return False, state
     if excess != seals.excess:
         seals = Shear(NO_ELEMENTS, excess)
-    full, way_left = direction * sliding, direction * way_left
     return True, FollowedShear(
-        stamp, velocity, elapsed, seals, seals, True, direction, rest_since, full, way_left, True
-    )
+        stamp=stamp, velocity=velocity, elapsed=elapsed, seals=seals, softer=seals, is_known=True, direction=direction,
+        rest_since=rest_since, fully_sheared=direction * sliding, way_back=direction * way_left, rests_alike=True,
+    )  # fmt: skip
 
 
 @compilable
@@ -254,7 +260,7 @@ def _moved(
     slides = slides and apart <= (1.0 - SETTLED) * sliding
     if abs(force) < sliding and seals.excess - slide.sliding_excess > (1.0 - SETTLED) * sliding:
         slides = False
-    return seals, softer, ShearedFriction(True, force, 0.5 * apart, slides)
+    return seals, softer, ShearedFriction(is_followed=True, force=force, std=0.5 * apart, slides=slides)
 
 
 @compilable
@@ -274,10 +280,9 @@ def _held(elasticity: PreslidingNumbers, sheared: Shear, moment: Moment, elapsed
     forces, excess = sheared
     if elapsed > 0.0:
         excess = relaxed(excess, moment.stiction, elapsed, elasticity.dwell_time)
-    f1, f2, f3, f4, f5, f6 = forces
     breakaway = between(0.0, moment.coulomb_friction + moment.stiction, math.inf)
     wanted = between(-breakaway, moment.force_sum, breakaway)
-    further = wanted - (f1 + f2 + f3 + f4 + f5 + f6)
+    further = wanted - _total(forces)
     if not moment.knows_force_sum or abs(further) <= NOISE * breakaway:
         return Shear(forces, excess)
     sliding = between(0.0, moment.coulomb_friction + excess, math.inf)
@@ -293,11 +298,17 @@ def _held(elasticity: PreslidingNumbers, sheared: Shear, moment: Moment, elapsed
 @compilable
 def _bearing(seals: Shear, softer: Shear) -> ShearedFriction:
     """Friction of seals that bear the force sum in a reversal, while softer ones follow the way."""
-    force, softer_force = 0.0, 0.0
+    force = _total(seals.forces)
+    return ShearedFriction(is_followed=True, force=force, std=0.5 * abs(force - _total(softer.forces)), slides=False)
+
+
+@compilable
+def _total(forces: Elements) -> float:
+    """Force of all elements [N]."""
+    total = 0.0
     for i in range(SLOTS):
-        force += seals.forces[i]
-        softer_force += softer.forces[i]
-    return ShearedFriction(True, force, 0.5 * abs(force - softer_force), False)
+        total += forces[i]
+    return total
 
 
 @compilable
@@ -339,5 +350,8 @@ def _sheared_against(elasticity: PreslidingNumbers, moment: Moment, direction: i
 @compilable
 def _fully_sheared(elasticity: PreslidingNumbers, friction: float) -> Elements:
     """Forces of elements that all yield [N], with their sum."""
-    w1, w2, w3, w4, w5, w6 = elasticity.shares
-    return Elements(w1 * friction, w2 * friction, w3 * friction, w4 * friction, w5 * friction, w6 * friction)
+    shares = elasticity.shares
+    return Elements(
+        first=shares.first * friction, second=shares.second * friction, third=shares.third * friction,
+        fourth=shares.fourth * friction, fifth=shares.fifth * friction, last=shares.last * friction,
+    )  # fmt: skip

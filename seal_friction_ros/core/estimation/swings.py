@@ -18,7 +18,7 @@ Source: energy balance; all numbers are our choice.
 
 from typing import NamedTuple
 
-from seal_friction_ros.core.foundation.compiled import compilable
+from seal_friction_ros.core.foundation.compiled import compilable, replace
 
 LONGEST_SWING = 2e-3  # [m] longer strokes are not judged
 LONGEST_STEP = 0.02  # [s] a longer time between two samples counts as this one
@@ -53,20 +53,24 @@ def swing_on(swing: Swing, elapsed: float, velocity: float, force_sum: float, fr
     """
     if elapsed == 0.0:  # a repeated stamp is no new sample
         return swing
-    way, work, heat, last_force, last_friction, doubted = swing
-    if way != 0.0 and (velocity > 0.0) != (way > 0.0):
-        stroke = abs(way)
-        if stroke > LONGEST_SWING:
-            last_force, last_friction = 0.0, 0.0
-        else:
-            mean_force, mean_friction = work / stroke, heat / stroke
-            if last_friction > 0.0:
-                is_shown = mean_force + last_force >= LEAST_SHARE * (mean_friction + last_friction)
-                doubted = 0.0 if is_shown else max(stroke, doubted)
-            last_force, last_friction = mean_force, mean_friction
-        way, work, heat = 0.0, 0.0, 0.0
+    if swing.way != 0.0 and (velocity > 0.0) != (swing.way > 0.0):
+        swing = _turned(swing)
     step = velocity * (elapsed if 0.0 < elapsed < LONGEST_STEP else LONGEST_STEP)
-    way += step
-    if abs(way) > MUCH_LONGER * doubted:
-        doubted = 0.0
-    return Swing(way, work + force_sum * step, heat + friction * step, last_force, last_friction, doubted)
+    way = swing.way + step
+    return Swing(
+        way=way, work=swing.work + force_sum * step, heat=swing.heat + friction * step, last_force=swing.last_force,
+        last_friction=swing.last_friction, doubted=0.0 if abs(way) > MUCH_LONGER * swing.doubted else swing.doubted,
+    )  # fmt: skip
+
+
+@compilable
+def _turned(swing: Swing) -> Swing:
+    """Swing at a reversal: the stroke before the next one."""
+    stroke = abs(swing.way)
+    if stroke > LONGEST_SWING:
+        return replace(NO_SWING, doubted=swing.doubted)
+    force, friction, doubted = swing.work / stroke, swing.heat / stroke, swing.doubted
+    if swing.last_friction > 0.0:
+        is_shown = force + swing.last_force >= LEAST_SHARE * (friction + swing.last_friction)
+        doubted = 0.0 if is_shown else max(stroke, doubted)
+    return Swing(way=0.0, work=0.0, heat=0.0, last_force=force, last_friction=friction, doubted=doubted)

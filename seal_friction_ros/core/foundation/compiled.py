@@ -2,12 +2,11 @@
 
 - ``@compiled``: the function always runs compiled (simulation, lubricated contact): twenty times faster.
 - ``@compilable``: the function runs as plain Python in the live node, which does not load the compiler, and compiled
-  where `compiled` code calls it (replay of long bags, servo plant): the same
-  source, the same bytes.
+  where `compiled` code calls it (replay of long bags, servo plant): the same source, the same bytes.
 
 What a friction law needs beyond numbers is here too: `bound` binds the parameters of a law to its function, `evaluate`
 calls it, `unrolled` loops over records of different types, `chosen_by_type` is a table of functions by the type of a
-record, and `for_compiler` converts records for compiled code.
+record, `for_compiler` converts records for compiled code, and `opened` makes them mutable there.
 
 numba and numpy are imported where they are used: numba takes half a second, and the live node may do without.
 
@@ -23,7 +22,7 @@ from collections.abc import Callable, Mapping
 from functools import cache, partial
 from pkgutil import resolve_name
 from types import FunctionType
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast, get_type_hints
 
 from seal_friction_ros.core.foundation.compiler_hooks import hooks
 
@@ -108,8 +107,30 @@ def unrolled(records: Any) -> Any:
 
 def replace(record: Record, **changes: Any) -> Record:
     """A named tuple with other values in some of its fields."""
-    changed: Record = record._replace(**changes)  # type: ignore[attr-defined]
-    return changed
+    return cast(Record, cast(Any, record)._replace(**changes))
+
+
+def opened(record: Record) -> Record:
+    """A copy that compiled code changes in place, of a mutable dataclass, or of what `for_compiler` made of it."""
+    return cast(Record, cast(Any, record).copy())
+
+
+def closed(record: Record) -> Record:
+    """What `for_compiler` makes of an `opened` record."""
+    return record
+
+
+def from_compiler(kind: type[Record], record: Any) -> Record:
+    """The dataclass of a record of `for_compiler`, and those within it."""
+    if isinstance(record, kind):
+        return record
+    hints = get_type_hints(kind)
+    return kind(
+        **{
+            name: from_compiler(hints[name], value) if dataclasses.is_dataclass(hints[name]) else value
+            for name, value in record._asdict().items()
+        }
+    )
 
 
 # -- functions with bound parameters ----------------------------------------------------------------------------------
@@ -162,8 +183,8 @@ def chosen_by_type(functions: Mapping[type, Callable[..., Any]]) -> Callable[...
 def for_compiler(value: Any) -> Any:
     """A record as compiled code takes it.
 
-    Tuples of numbers become arrays, a bound function becomes a record of its parameters, a dataclass a named tuple (of
-    the fields that its ``COMPILED`` names, if it has one); records within records likewise.
+    Tuples of numbers become arrays, a bound function becomes a record of its parameters, a dataclass a named tuple of
+    its fields and properties that are numbers or made of numbers; records within records likewise.
     """
     if runs_as_python():
         return value
@@ -173,8 +194,9 @@ def for_compiler(value: Any) -> Any:
 
 def _converted(value: Any) -> Any:
     if dataclasses.is_dataclass(value):
-        names = getattr(value, 'COMPILED', None) or tuple(field.name for field in dataclasses.fields(value))
-        return _record_type(type(value).__name__, names)(*(_converted(getattr(value, name)) for name in names))
+        given = {name: getattr(value, name) for name in _names_of(cast(Any, type(value)))}
+        numeric = {name: each for name, each in given.items() if _is_numeric(each) or dataclasses.is_dataclass(each)}
+        return _record_type(type(value).__name__, tuple(numeric))(*map(_converted, numeric.values()))
     if isinstance(value, partial):
         return _bound_type(value.func)(tuple(map(_converted, value.args)))
     if isinstance(value, tuple):
@@ -186,6 +208,21 @@ def _converted(value: Any) -> Any:
             return np.array(value)
         return tuple(map(_converted, value))
     return value
+
+
+@cache
+def _names_of(kind: type) -> tuple[str, ...]:
+    """Fields of a dataclass, and its properties that are numbers."""
+    properties = inspect.getmembers(kind, lambda member: isinstance(member, property))
+    numbers = [name for name, member in properties if get_type_hints(member.fget).get('return') in (float, int, bool)]
+    return (*(field.name for field in dataclasses.fields(kind)), *numbers)
+
+
+def _is_numeric(value: Any) -> bool:
+    """Whether compiled code has a place for it: a number, a function with bound parameters, none, or tuples of such."""
+    if isinstance(value, tuple):
+        return all(map(_is_numeric, value))
+    return value is None or isinstance(value, int | float | partial) or hasattr(value, 'dtype')
 
 
 class Kept(NamedTuple):
@@ -203,29 +240,32 @@ def keep(value: Any) -> Any:
 
 
 @cache
-def _kept_type() -> Any:
+def _mutable_type(name: str, fields: tuple[str, ...]) -> Any:
+    """Type of a mutable record in compiled code, and of what Python holds of it: one pointer."""
     import numba
     from numba.experimental import structref as untyped
 
     structref: Any = untyped
     unliteral: Any = numba.types.unliteral
 
-    class KeptStruct(numba.types.StructRef):
+    class MutableStruct(numba.types.StructRef):
+        closed = name, fields
+
         def preprocess_fields(self, fields: Any) -> Any:
             return tuple((name, unliteral(kind)) for name, kind in fields)
 
-    class KeptProxy(untyped.StructRefProxy):
-        """What Python holds of a kept record."""
+    class MutableProxy(untyped.StructRefProxy):
+        """What Python holds of it."""
 
-    structref.register(_named(KeptStruct, 'KeptStruct'))
-    structref.define_proxy(_named(KeptProxy, 'KeptProxy'), KeptStruct, ['value'])
-    return KeptProxy
+    structref.register(_named(MutableStruct, 'struct', name, *fields))
+    structref.define_proxy(_named(MutableProxy, 'proxy', name, *fields), MutableStruct, list(fields))
+    return MutableProxy
 
 
 @cache
 def _maker_of_kept() -> Callable[[Any], Any]:
-    """Function of a value that makes its `KeptProxy`. numba's own function is compiled anew in each process."""
-    kind = _kept_type()
+    """Function of a value that makes its record. numba's own function is compiled anew in each process."""
+    kind = _mutable_type('Kept', ('value',))
 
     def make(value: Any) -> Any:
         return kind(value)
@@ -262,8 +302,8 @@ def __getattr__(name: str) -> Any:
             return _bound_type(resolve_name(':'.join(parts)))
         except (ImportError, AttributeError):  # a function that is gone, which an index of compiled code still names
             return _named(type('gone', (namedtuple('bound', ['parameters']),), {'__slots__': ()}), kind, *parts)
-    if kind in ('KeptStruct', 'KeptProxy'):
-        _kept_type()
+    if kind in ('struct', 'proxy'):
+        _mutable_type(parts[0], tuple(parts[1:]))
         return globals()[name]
     raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
 
@@ -303,17 +343,26 @@ def _stand_in(function: Callable[..., Any], known: Callable[..., Any]) -> None:
 
 @cache
 def _teach_the_compiler() -> None:
-    """Once: what `replace`, `evaluate` and `bisect_right` are in compiled code."""
+    """Once: what `replace`, `opened`, `closed`, `evaluate` and `bisect_right` are in compiled code."""
     import numpy as np
     from numba.extending import overload
 
     @overload(replace, strict=False, jit_options=INNER)
     def _replace(record: Any, **changes: Any) -> Callable[..., Any]:
         # Every field is an argument: the compiler tells two calls apart by the places and types of their arguments.
-        given = ', '.join(record.fields)
-        values = ', '.join(name if name in changes else f'record.{name}' for name in record.fields)
-        code = compile(f'lambda record, {given}: kind({values})', '<replace>', 'eval').co_consts[0]
-        return FunctionType(code, {'kind': record.instance_class}, 'replace', (None,) * len(record.fields))
+        values = [name if name in changes else f'record.{name}' for name in record.fields]
+        return _constructor(record.instance_class, values, tuple(record.fields))
+
+    @overload(opened, strict=False, jit_options=INNER)
+    def _opened(record: Any) -> Callable[..., Any]:
+        parts = zip(record.fields, record.types, strict=True)
+        values = [f'opened(record.{name})' if _is_of_dataclass(kind) else f'record.{name}' for name, kind in parts]
+        return _constructor(_mutable_type(record.instance_class.__name__, tuple(record.fields)), values)
+
+    @overload(closed, strict=False, jit_options=INNER)
+    def _closed(record: Any) -> Callable[..., Any]:
+        values = [f'closed(record.{n})' if hasattr(kind, 'closed') else f'record.{n}' for n, kind in record._fields]
+        return _constructor(_record_type(*record.closed), values)
 
     @overload(evaluate, jit_options=INNER)
     def _evaluate(function: Any, first: Any, second: Any) -> Callable[..., Any]:
@@ -333,6 +382,22 @@ def _teach_the_compiler() -> None:
             return np.searchsorted(knots, x, side='right')
 
         return implementation
+
+
+def _is_of_dataclass(kind: Any) -> bool:
+    """Whether a type of the compiler is what `for_compiler` made of a dataclass."""
+    return getattr(getattr(kind, 'instance_class', None), '__module__', '') == __name__
+
+
+def _constructor(kind: Any, values: list[str], given: tuple[str, ...] = ()) -> Callable[..., Any]:
+    """Function of a record, and of the ``given`` fields, that makes a ``kind`` of these values.
+
+    It is compiled from text, since the compiler takes no loop over the names of fields.
+    """
+    arguments = ', '.join(('record', *given))
+    code = compile(f'lambda {arguments}: kind({", ".join(values)})', f'<{kind.__name__}>', 'eval').co_consts[0]
+    known = {'kind': kind, 'opened': opened, 'closed': closed}
+    return FunctionType(code, known, 'constructor', (None,) * len(given))
 
 
 @cache

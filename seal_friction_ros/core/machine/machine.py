@@ -299,18 +299,18 @@ def receive(
         actuator, known = machine.actuators[number], states[number]
         memory: Memory = known.memory
         records: Sequence[Input] = (message,)
-        before = after = known.pipeline
+        after = known.pipeline.copy()  # all or nothing
         named = partial(emit, actuator.mapping.name)
         try:
             if taken:
-                stamp = message.stamp if message.stamp is not None else stamp_of(actuator, before, received, sent)
+                stamp = message.stamp if message.stamp is not None else stamp_of(actuator, after, received, sent)
                 memory, records = records_of(actuator, memory, taken, message.numbers, stamp, message.frame_id)
             for record in records:
-                after = pipeline.receive(actuator.pipeline, after, record, received, named, sent)
+                pipeline.receive(actuator.pipeline, after, record, received, named, sent)
         except (ArithmeticError, ValueError) as error:
             states[number] = known._replace(force=0.0, fault=f'{plan.topic}: {type(error).__name__}: {error}')
             continue
-        force = known.force if after.feedforward is before.feedforward else newest_force(after.feedforward)
+        force = known.force if after.feedforward is known.pipeline.feedforward else newest_force(after.feedforward)
         states[number] = ActuatorState(after, memory, force)
     return MachineState(tuple(states))
 

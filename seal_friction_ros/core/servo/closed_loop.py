@@ -138,7 +138,7 @@ def run_closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: F
         ]
         messages += [ServoReference(stamp, *setpoint), Velocity(stamp, velocity)]
         for message in messages:
-            estimation = pipeline.receive(parameters, estimation, message, stamp, emit)
+            pipeline.receive(parameters, estimation, message, stamp, emit)
         forces.append(newest.force)
         force = (1.0 - part) * forces[-1 - back] + part * forces[-2 - back]
         if sensors.encoder_step:

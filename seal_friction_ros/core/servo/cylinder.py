@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.foundation.units import INCH
@@ -40,11 +39,6 @@ class Cylinder(CheckedParameters):
     )
     bulk_modulus: float = parameter(7e8, unit='Pa', lower=1e7, upper=5e9, description='Effective: oil, lines, walls.')
     vapour_pressure: float = parameter(1e3, unit='Pa', lower=1.0, upper=1e5, description='Of the oil, absolute.')
-
-    COMPILED: ClassVar = (
-        'area_a', 'area_b', 'rod_area', 'area_ratio', 'limit', 'mid_volume_a', 'mid_volume_b', 'internal_leakage',
-        'external_leakage', 'bulk_modulus', 'vapour',
-    )  # fmt: skip
 
     def __post_init__(self) -> None:
         super().__post_init__()

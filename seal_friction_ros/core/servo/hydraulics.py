@@ -10,7 +10,7 @@ them in the sources:
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 from seal_friction_ros.core.foundation.compiled import compiled
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
@@ -40,11 +40,6 @@ class ServoValve(CheckedParameters):
     transition_pressure: float = parameter(
         3e5, unit='Pa', lower=1e3, upper=1e7, description='Pressure drop below which an orifice is laminar.'
     )
-
-    COMPILED: ClassVar = (
-        'supply_pressure', 'return_pressure', 'natural_frequency', 'damping_ratio', 'null_leakage',
-        'transition_pressure', 'orifice_gain',
-    )  # fmt: skip
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -9,7 +9,6 @@ leak nothing; the walls keep the temperature of the supply; air that flows back 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 from seal_friction_ros.core.foundation.compiled import compiled, for_compiler
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
@@ -47,11 +46,6 @@ class PneumaticValve(CheckedParameters):
     heat_conductance: float = parameter(
         1.0, unit='W/K', lower=0.0, upper=1e5, description='Between the air of each chamber and its walls.'
     )
-
-    COMPILED: ClassVar = (
-        'supply_pressure', 'return_pressure', 'sonic_conductance', 'critical_pressure_ratio', 'laminar_ratio',
-        'null_conductance', 'natural_frequency', 'damping_ratio', 'temperature', 'heat_conductance',
-    )  # fmt: skip
 
     @property
     def return_pressure(self) -> float:

@@ -126,6 +126,7 @@ def collected(
         return kind
 
     def fill(blocks: Iterable[Messages]) -> _Collector:
+        """Collector of all blocks."""
         collector = make()
         with progress(f'read {bag.path.name}', bag.total) as advance:
             for block in blocks:

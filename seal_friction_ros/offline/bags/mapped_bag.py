@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -70,8 +71,10 @@ def machine_in(bag: Path, mapping: MappingFile) -> tuple[Machine, MachineState]:
         raise ValueError(f'{bag}: none of the topics of {mapping.name}; it has {", ".join(sorted(known)) or "none"}')
     machine = make_machine(mapping.file, mapping.configurations, read_definitions(bag, mapping.file.topics.values()))
     offset = _clock_offset(machine, bag)
-    states = (one._replace(pipeline=one.pipeline._replace(clock_offset=offset)) for one in init(machine).actuators)
-    return machine, MachineState(tuple(states))
+    state = init(machine)
+    for one in state.actuators:
+        one.pipeline.clock_offset = offset
+    return machine, state
 
 
 def _clock_offset(machine: Machine, bag: Path) -> int:
@@ -183,7 +186,7 @@ class Translation:
     def follow(self, clock: Clock, received: int) -> None:
         """Follow simulated time."""
         offset = clock.stamp - received
-        self._states = [known._replace(pipeline=known.pipeline._replace(clock_offset=offset)) for known in self._states]
+        self._states = [one._replace(pipeline=replace(one.pipeline, clock_offset=offset)) for one in self._states]
 
 
 def is_for(mapping: MappingFile, infos: Mapping[str, TopicInfo]) -> bool:

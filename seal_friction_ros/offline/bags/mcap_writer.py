@@ -266,6 +266,7 @@ class _Stream:
         self._handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, FILE_MODE)
 
     def write(self, data: bytes) -> None:
+        """Append bytes; OSError with the path if the disk does not take all of them."""
         view = memoryview(data)
         while view:
             try:

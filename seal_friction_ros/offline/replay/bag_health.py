@@ -165,7 +165,7 @@ class _Observer(Run):
 
     def learn_on(self, learnt: AdaptationState) -> None:
         """Go on with what was learnt before."""
-        self.state = self.state._replace(estimator=self.state.estimator._replace(adaptation=learnt))
+        self.state.estimator.adaptation = learnt
 
     def configure(self, snapshot: Snapshot) -> None:
         """Take a recorded configuration."""

@@ -41,6 +41,7 @@ from seal_friction_ros.core.estimation.records import (
     SealTemperature,
     ServoReference,
     Velocity,
+    field_names,
 )
 from seal_friction_ros.core.estimation.sheared_seals import NOT_FOLLOWED, FollowedShear
 from seal_friction_ros.core.estimation.swings import NO_SWING, Swing
@@ -153,8 +154,8 @@ def with_part(path: str, value) -> str:
 
 def bits(value):
     """A state bit by bit; every NaN counts alike, since nothing computes with its payload."""
-    if isinstance(value, tuple):
-        return [type(value), *(bits(item) for item in value)]
+    if field_names(value):
+        return [type(value), *(bits(getattr(value, name)) for name in field_names(value))]
     return struct.pack('<d', math.nan if math.isnan(value) else value) if isinstance(value, float) else value
 
 
@@ -344,7 +345,8 @@ def test_the_state_of_an_older_version_begins_anew_with_its_newest_inputs(versio
     newest = ('pressure', 'force', 'refused')
     document['state'] = {name: document['state'][name] for name in newest} | {'estimator': 'unknown'}
     back = parse_snapshot(json.dumps(document))
-    expected = init(CONFIGURATION.parameters())._replace(**{name: getattr(SNAPSHOT.state, name) for name in newest})
+    newest_inputs = {name: getattr(SNAPSHOT.state, name) for name in newest}
+    expected = dataclasses.replace(init(CONFIGURATION.parameters()), **newest_inputs)
     assert bits(back.state) == bits(expected)
     assert back.version == (version or 1)
 

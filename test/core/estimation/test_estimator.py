@@ -56,7 +56,7 @@ def sample(stamp=START, velocity=0.01, pressure=3e6, force=30.0, *, pressure_age
 
 def init(parameters=PARAMETERS) -> EstimatorState:
     """Before the first sample, but with a velocity whose ripple is known: there is none."""
-    return estimator.init(parameters)._replace(motion=NOT_CONDITIONED._replace(samples=SETTLING))
+    return replace(estimator.init(parameters), motion=NOT_CONDITIONED._replace(samples=SETTLING))
 
 
 def run(samples, parameters=PARAMETERS) -> list[FrictionEstimate]:
@@ -145,7 +145,7 @@ def test_a_state_carries_all_that_matters_from_the_past(parameters, samples, cut
     state = init(parameters)
     for one in samples[:cut]:
         state, _ = step(parameters, state, one)
-    kept = type(state)(*state)
+    kept = state.copy()
     rest = []
     for one in samples[cut:]:
         kept, estimate = step(parameters, kept, one)
@@ -811,7 +811,7 @@ def test_a_law_that_disagrees_is_learnt_from_on():
     before = slid()
     learnt = before.adaptation.filter
     learnt = learnt._replace(terms=learnt.terms._replace(scale=2.5), friction_std=1.0)
-    before = before._replace(adaptation=before.adaptation._replace(filter=learnt))
+    before.adaptation = before.adaptation._replace(filter=learnt)
     after, estimate = adapted_step(sample(before.stamp + 10 * MS), before=before)
     assert estimate.status == Status.MODEL_DISAGREES
     assert after.adaptation.filter.stamp == after.stamp

@@ -383,7 +383,7 @@ def test_simulated_time_that_stands_still_with_all_stamps_fades_the_force():
 @pytest.mark.parametrize('shown', [None, 0])
 def test_before_simulated_time_comes_there_is_no_force(shown: int | None):
     """A node with ``use_sim_time`` begins at time 0; a simulator that has not started may send 0, too."""
-    player = Player(state=init(PARAMETERS)._replace(clock=0))
+    player = Player(state=replace(init(PARAMETERS), clock=0))
     messages = moments(0, 600)
     player.play(messages if shown is None else with_clock(messages, lambda _: shown))
     assert not any(made.force for made in player.made)

@@ -171,7 +171,7 @@ def state_after(number: int, reversals: int | None = None, ratio: float = 1.0) -
         reversals=number if reversals is None else reversals,
     )
     adaptation = NOT_ADAPTED._replace(strokes=strokes)
-    return estimator.init(PARAMETERS)._replace(adaptation=adaptation, pressure=Pressure(6, 3e6, 2e6))
+    return replace(estimator.init(PARAMETERS), adaptation=adaptation, pressure=Pressure(6, 3e6, 2e6))
 
 
 def followed_reversals(numbers, known=SealHealth()):  # noqa: B008  immutable

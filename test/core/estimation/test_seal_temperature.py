@@ -197,9 +197,7 @@ class Run:
         self.state, self.answers = pipeline.init_running(self.parameters), []
 
     def take(self, record, received):
-        self.state = pipeline.receive(
-            self.parameters, self.state, record, received, lambda answer, _: self.answers.append(answer)
-        )
+        pipeline.receive(self.parameters, self.state, record, received, lambda answer, _: self.answers.append(answer))
 
     def warm(self, celsius):
         """Three readings, the fewest that are believed."""

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import pytest
 import yaml
@@ -528,7 +529,7 @@ def test_a_reference_of_positions_has_the_velocity_between_the_last_two_up_to_20
 
 def test_a_message_without_a_stamp_has_that_of_its_receipt_on_the_clock_of_the_stamps():
     run = Run(made(EXCAVATOR))
-    states = [one._replace(pipeline=one.pipeline._replace(clock_offset=500)) for one in run.state.actuators]
+    states = [one._replace(pipeline=replace(one.pipeline, clock_offset=500)) for one in run.state.actuators]
     run.state = m.MachineState(tuple(states))
     for topic in ('/a', '/b'):
         run.take(topic, message('std_msgs/Float64MultiArray', data=[20.0, 30.0, 40.0]), 7)

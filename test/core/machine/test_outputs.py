@@ -1,5 +1,7 @@
 """Commands for controllers, read back by rclpy."""
 
+from dataclasses import replace
+
 import pytest
 import yaml
 from harness.machines import EXCAVATOR, made, message_class, parsed
@@ -87,7 +89,7 @@ def test_actuators_with_places_of_their_own_are_accepted():
 def test_commands_are_due_after_a_feed_forward_or_a_fault_on_the_clock_of_the_stamps():
     machine = made(EXCAVATOR)
     state = init(machine)
-    offset = [one._replace(pipeline=one.pipeline._replace(clock_offset=500), force=2.0) for one in state.actuators]
+    offset = [one._replace(pipeline=replace(one.pipeline, clock_offset=500), force=2.0) for one in state.actuators]
     state = MachineState(tuple(offset))
     assert due_commands(machine, state, False, STAMP) == []
     assert due_commands(machine, state, True, STAMP) == commands(machine.file, dict.fromkeys(NAMES, 2.0), STAMP + 500)

@@ -10,7 +10,7 @@ from seal_friction_ros.core.machine.security_policy import security_policy
 
 
 def allowed(file, kind='topics', right='subscribe') -> list[str]:
-    policy = ElementTree.fromstring(security_policy(file, 'a -- b').encode())  # noqa: S314
+    policy = ElementTree.fromstring(security_policy(file, 'a -- b').encode())  # noqa: S314  our own text
     (profile,) = policy.iter('profile')
     return [one.text for part in profile.iter(kind) if part.get(right) == 'ALLOW' for one in part]
 

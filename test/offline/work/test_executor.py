@@ -141,7 +141,7 @@ def test_workers_end_after_a_parent_that_was_killed():
 
 def is_running(process: int) -> bool:
     try:
-        with open(f'/proc/{process}/stat') as file:  # noqa: PTH123
+        with open(f'/proc/{process}/stat') as file:  # noqa: PTH123  a file of the kernel
             return re.sub(r'.*\)', '', file.read()).split()[0] != 'Z'
     except OSError:
         return False
