@@ -165,7 +165,7 @@ _WITHOUT_SPEEDS = (('asymmetric', 'asymmetry', ('asymmetry',)),)
 class Variation(NamedTuple):
     """What the readings vary, which decides what they can identify."""
 
-    pressures: int = 3  # distinct ones, up to 3: with fewer, the rise over pressure is a prior
+    pressures: int = 3  # distinct ones, up to 3: with fewer, the rise over pressure is a prior; 0: friction made them
     speeds: bool = True  # the speed varies at one pressure and direction: velocity terms
     asymmetry: bool = True  # sources hold several pressures: asymmetry, which else is an offset
     exponent: bool = True  # there are enough pressures for a free pressure exponent
@@ -184,6 +184,8 @@ def candidate_laws(
     parts = {'geometry': geometry, 'normal_force_law': normal_force_law} if geometry and normal_force_law else {}
     bases = [_base(law_type, parts, variation.speeds) for law_type in FRICTION_LAWS]
     constant, *laws = [base for base in bases if base is not None]
+    if variation.pressures == 0:
+        return (constant, *with_velocity_terms(constant, variation))
     if variation.pressures < 3:
         return (_with_prior(next(law for law in laws if law.law_type is PressurePowerLaw), variation.pressures),)
     found = [constant, *(with_velocity_terms(constant, variation) if variation.speeds else ())]

@@ -23,6 +23,7 @@ from seal_friction_ros.core.identification.readings import (
     check_readings,
     has_pressures,
 )
+from seal_friction_ros.core.identification.what_a_log_tells import free_rod
 
 BLOCKS = 10  # contiguous parts of a swept log, each predicted from the others
 HELD_LOG = 0.8  # of the even samples in strokes at held speed and pressure: each stroke is a reading (our choice)
@@ -55,6 +56,11 @@ def prepare_logs(logs: Sequence[RecordedLog], chambers: Sequence[str]) -> Prepar
         readings, chamber_pressures = _held(logs, of_strokes, chambers)
         breakaway = _breakaway(logs, chambers, readings)
         counts = held
+    free = free_rod([log.signals for log in logs], even)
+    if free is not None:
+        one_level = replace(readings, free_rod=free, level=np.zeros_like(readings.level))
+        readings = with_predictable_groups(one_level)
+        breakaway = breakaway and replace(breakaway, free_rod=free, level=np.zeros_like(breakaway.level))
     check_readings(readings)
     used = {log.name: count for log, count in zip(logs, counts, strict=True)}
     total = {log.name: len(log.signals.time) for log in logs}

@@ -54,11 +54,20 @@ def variation_of(readings: FrictionReadings) -> Variation:
     several = [len(np.unique(readings.level[readings.source == source])) > 1 for source in np.unique(readings.source)]
     levels = len(readings.levels)
     return Variation(
-        pressures=3 if has_pressures(readings) else min(levels, 2) if are_far_apart(readings.seal_pressure) else 1,
+        pressures=_pressures(readings),
         speeds=bool(np.isfinite(speed).all()) and float(np.mean(faster or [False])) > 0.5,
         asymmetry=any(several) and all(len(index) for index in readings.two_sided),
         exponent=readings.are_samples or levels >= FEWEST_PRESSURES_FOR_EXPONENT,
     )
+
+
+def _pressures(readings: FrictionReadings) -> int:
+    """Pressures that tell something of the friction: up to 3; 0 if they are its effect."""
+    if readings.free_rod is not None:
+        return 0
+    if has_pressures(readings):
+        return 3
+    return min(len(readings.levels), 2) if are_far_apart(readings.seal_pressure) else 1
 
 
 class Rise(NamedTuple):
@@ -181,7 +190,7 @@ def score_laws(
     start_values: dict[str, float] = {}
     others = regroupings(readings)
     for law in laws:
-        levels, count = len(readings.levels), len(law.parameters)
+        levels, count = len(readings.levels), len(law.parameters) - len(law.velocity_terms)
         needed = count + (readings.left_out_by == 'pressure')
         if not readings.are_samples and levels < needed:
             scores.append(LawScore(law, why_not=f'{count} parameters need {needed} pressures, there are {levels}'))
@@ -328,15 +337,15 @@ def choose_without(
 def collinear_spread(scores: Sequence[LawScore], selected: LawFit, readings: FrictionReadings) -> float:
     """Relative spread of laws that fit nearly as well, where speed and pressure part [-]: the data cannot tell them.
 
-    Laws within `NEAR` of the best are compared at every pair of a speed and a pressure (quartiles of each), also those
+    Sound laws within `NEAR` of the best are compared at every pair of a speed and a pressure (quartiles of each), also those
     pairs that never occurred: where speed and pressure always changed together, laws agree on the readings and differ
     there. The spread is the root mean square deviation from the ``selected`` law. 0 for held readings.
     """
     if not readings.are_samples:
         return 0.0
-    scored = [score for score in scores if score.fit is not None and score.losses is not None]
-    least = min(float(score.losses.mean()) for score in scored if score.losses is not None)
-    near = [s.fit for s in scored if s.fit is not None and s.losses is not None and s.losses.mean() <= NEAR * least]
+    least = min(mean_loss(score) for score in scores if score.losses is not None)
+    fits = [score.fit for score in scores if score.losses is not None and mean_loss(score) <= NEAR * least]
+    near = [found for found in fits if found is not None and not found.why_unsound]
     shares = (0.125, 0.375, 0.625, 0.875)
     speeds = np.quantile(np.abs(readings.at.velocity), shares)
     order = np.argsort(readings.seal_pressure)

@@ -86,6 +86,11 @@ def identify_kinds(
             'give bags or logs'
         )
     prepared = sources.prepare()
+    if prepared.readings.free_rod is not None:
+        raise ValueError(
+            f'{paths[0]}: nothing but friction loads the rod, so the pressures are the effect of the friction and '
+            'tell no kinds apart: load the rod and record the load, or drive with several supply or return pressures'
+        )
     data = kinds_readings(prepared.readings, prepared.chamber_pressures, kinds)
     found = fit_kinds(data, largest_error)
     if not _error(found) <= LARGEST_ERROR:
