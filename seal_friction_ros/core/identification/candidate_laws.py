@@ -80,6 +80,7 @@ class CandidateLaw:
     fixed: ParameterValues = field(default_factory=dict)  # parameters that are not fitted
     parts: Mapping[str, Any] = field(default_factory=dict)
     """known fields of the law: geometry and normal force; empty if it needs neither"""
+    has_prior: bool = False  # whether all its terms are fitted at once, with a prior on each (`friction_model`)
 
     @property
     def depends_on_pressure(self) -> bool:
@@ -212,6 +213,18 @@ def with_velocity_terms(base: CandidateLaw, variation: Variation) -> tuple[Candi
         for suffix, terms, names in (_WITH_SPEEDS if variation.speeds else _WITHOUT_SPEEDS)
         if variation.asymmetry or 'asymmetry' not in names
     )
+
+
+def law_of_all_terms(variation: Variation) -> CandidateLaw:
+    """The pressure power law, or constant friction, with every velocity term that the data can tell and a prior."""
+    law_type = PressurePowerLaw if variation.pressures else ConstantCoulomb
+    told = {'asymmetry'} if variation.asymmetry else set()
+    told |= {'viscous_friction', 'stribeck_friction', 'stribeck_velocity'} if variation.speeds else set()
+    terms = tuple(p for p in fitted_parameters(VelocityTerms) if p.name in told)
+    parts = {'viscous_friction': 'viscous', 'stribeck_friction': 'Stribeck', 'asymmetry': 'asymmetry'}
+    formula = ' + '.join([law_type.FORMULA, *(parts[p.name] for p in terms if p.name in parts)])
+    parameters = (*fitted_parameters(law_type), *terms)
+    return CandidateLaw('all_terms', f'{formula}, each with a prior', law_type, parameters, has_prior=True)
 
 
 def _with_exponent(law: CandidateLaw, suffix: str, exponent: float) -> CandidateLaw:

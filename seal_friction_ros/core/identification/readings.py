@@ -4,6 +4,7 @@ Each error of a check is one line: source, fault, and what to do.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -47,6 +48,7 @@ class RecordedLog(NamedTuple):
     sliding: Sliding
     temperature: FloatArray | None = None  # [K] of each sample; None if not recorded
     position: FloatArray | None = None  # [m] likewise
+    dropped: Mapping[str, int] = {}  # reason -> number of samples that are not in the signals
 
 
 class ManualReadings(NamedTuple):

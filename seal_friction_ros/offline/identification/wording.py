@@ -7,6 +7,7 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.units import BAR, ZEROS
 from seal_friction_ros.core.identification import diagnostics
+from seal_friction_ros.core.identification.admission import FAULTS, WORTH_A_WARNING
 from seal_friction_ros.core.identification.breakaway import BreakawayFit
 from seal_friction_ros.core.identification.force_correction import ForceCorrection
 from seal_friction_ros.core.identification.readings import has_pressures
@@ -31,6 +32,7 @@ def warnings_of(
 ) -> Iterator[str]:
     """Limits of the law that its user has to know, one line each."""
     readings = data.prepared.readings
+    yield from _dropped_texts(data)
     yield from _change_texts(quality)
     one_way = [name for name, index in zip(readings.names, readings.two_sided, strict=True) if not len(index)]
     if one_way:
@@ -60,6 +62,14 @@ def warnings_of(
         yield _dwell_text(quality.breakaway)
     if quality.breakaway is None:
         yield 'no stroke starts from rest, so breakaway is not identified: let the rod rest 30 s before some strokes'
+
+
+def _dropped_texts(data: IdentificationData) -> Iterator[str]:
+    total, dropped = sum(data.prepared.total.values()), data.prepared.left_out
+    for reason in FAULTS:
+        count = dropped.get(reason, 0)
+        if count > WORTH_A_WARNING * total:
+            yield f'{count} of {total} samples ({100.0 * count / total:.0f} %) are dropped: {reason}'
 
 
 def _free_rod_text(found: FreeRod) -> str:
