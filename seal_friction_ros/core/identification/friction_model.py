@@ -307,7 +307,7 @@ def fit_model(
     chamber_pressures: FloatArray | None = None,
     near: FloatArray | None = None,
 ) -> ModelFit:
-    """Most probable parameters and their covariance.
+    """Most probable parameters and their covariance, with Stribeck friction and asymmetry where they are more probable.
 
     Args:
         readings: Of one or several sources.
@@ -330,7 +330,13 @@ def fit_model(
         fitted = layout.parameters - float(np.sum(np.diag(fit.covariance) / problem.prior[:, 1] ** 2))
         weight, scatter = _weights(readings, residual, problem.size, fitted)
         starts = [vector]
-    vector, jacobian, left = _solved(problem, weight, starts[0])
+    choices = [
+        _problem(readings, columns, told._replace(stribeck=falling, asymmetry=uneven), chamber_pressures)
+        for falling in sorted({told.stribeck, False})
+        for uneven in sorted({told.asymmetry, False})
+    ]
+    found = [(each, *_solved(each, weight, starts[0])) for each in choices]
+    problem, vector, jacobian, left = max(found, key=lambda one: _evidence(*one))
     return _model_fit(problem, vector, jacobian, scatter, left, chamber_pressures)
 
 
@@ -374,6 +380,12 @@ def left_out(
         signed[out] = tested.at.direction * (rest - offsets[tested.source])
         vectors.append(others.vector)
     return predicted, signed, np.array(vectors)
+
+
+def _evidence(problem: _Problem, _: FloatArray, jacobian: FloatArray, left: FloatArray) -> float:
+    """Logarithm of the probability of the readings by the method of Laplace, but for a constant."""
+    determinant = float(np.linalg.slogdet(jacobian.T @ jacobian)[1])
+    return -0.5 * float(left @ left) - 0.5 * determinant - float(np.log(problem.prior[:, 1]).sum())
 
 
 def _starts(problem: _Problem, layout: _Layout, told: Told) -> list[FloatArray]:

@@ -143,6 +143,13 @@ class KindsIdentification:
         return np.asarray(undivided * np.sqrt(self.fit.division * (1.0 - self.fit.division) / 3.0))
 
     @property
+    def unseen_std(self) -> float:
+        """Relative standard deviation of all friction by the covariance of the posterior, RMS over `_grid` [-]."""
+        at = _grid(self.fit.data)[1]
+        model = self.fit.model
+        return float(np.sqrt(np.mean((model.std(at) / np.maximum(model.friction(at), 1e-12)) ** 2)))
+
+    @property
     def apart_std(self) -> FloatArray:
         """Standard deviation of the mean friction of each kind [N] because kinds are hard to tell apart."""
         return np.hypot(self.fit.model.errors, self.division_std)
@@ -211,6 +218,15 @@ class ChamberPressures(NamedTuple):
     b: float
 
 
+def _grid(data: KindsReadings) -> tuple[list[ChamberPressures], OperatingConditions]:
+    """Pairs of 0, half and all of the highest pressure, and the conditions there at the mean speed."""
+    high = float(np.abs(data.chamber_pressures).max())
+    grid = [ChamberPressures(a * high, b * high) for a, b in product((0.0, 0.5, 1.0), repeat=2)]
+    seen = pressures_at_seals([chamber for kind in data.kinds for chamber in kind.chambers], *np.array(grid).T)
+    speed = float(np.nan_to_num(np.abs(data.readings.at.velocity)).mean())
+    return grid, OperatingConditions(seen, None, np.full(len(grid), speed), np.ones(len(grid)))
+
+
 def proposed_conditions(data: KindsReadings, fit: KindsFit | None = None) -> tuple[tuple[ChamberPressures, ...], float]:
     """Chamber pressures that separate the kinds best, and the largest correlation of `moved_together` with them.
 
@@ -219,10 +235,8 @@ def proposed_conditions(data: KindsReadings, fit: KindsFit | None = None) -> tup
     hand. Then those where the ``fit`` knows the friction of all seals least, beyond `NOTICED` of it. The grid and
     the limits are our choice.
     """
-    high = float(np.abs(data.chamber_pressures).max())
-    grid = [ChamberPressures(a * high, b * high) for a, b in product((0.0, 0.5, 1.0), repeat=2)]
-    chambers = [chamber for kind in data.kinds for chamber in kind.chambers]
-    seen = pressures_at_seals(chambers, *np.array(grid).T)
+    grid, at = _grid(data)
+    seen = at.pressure
     sums = np.column_stack([seen[:, data.columns_of(k)].sum(axis=1) for k in range(len(data.kinds))]) / BAR
     rows = np.column_stack([data.power_sum(k, 1.0) for k in range(len(data.kinds))])
     weight = max(len(rows) // 4, 1)
@@ -238,8 +252,6 @@ def proposed_conditions(data: KindsReadings, fit: KindsFit | None = None) -> tup
         rows = np.vstack((rows, np.repeat(sums[[index]], weight, axis=0)))
         chosen.append(index)
     if fit is not None:
-        speed = float(np.nan_to_num(np.abs(data.readings.at.velocity)).mean())
-        at = OperatingConditions(seen, None, np.full(len(grid), speed), np.ones(len(grid)))
         disagreement = fit.model.std(at) / np.maximum(fit.model.friction(at), 1e-12)
         order = [int(i) for i in np.argsort(-disagreement) if disagreement[i] > NOTICED and int(i) not in chosen]
         chosen += order[: MOST_CONDITIONS - len(chosen)]

@@ -139,7 +139,8 @@ def _seal_document(
 ) -> dict[str, Any]:
     """Seal file of one kind, checked as the node checks it.
 
-    Its standard deviation holds that of all seals, and what the data and this cylinder do not tell apart.
+    Its standard deviation is its share of that of all seals together, also at pressures that were not driven; that of
+    the kind alone is in the section ``identification``.
 
     Raises:
         ValueError: The law makes no valid seal.
@@ -149,10 +150,7 @@ def _seal_document(
     of_kind = float(fit.frictions(readings.at)[:, number].mean())
     share = float(fit.division[number]) / seals
     everyone = readings.at.pressure.shape[1]
-    apart = float(fit.model.errors[number]) / max(of_kind, 1e-12)
-    has_share = of_kind > 0.0
-    relative = float(np.hypot(band.relative, apart)) if has_share else band.relative
-    alone = float(found.division_std[number]) if has_share else float(found.apart_std[number])
+    relative = float(np.hypot(band.relative, found.unseen_std))
     pressure = readings.at.pressure[:, fit.data.columns_of(number)]
     files = ', '.join(file.name for file in sources.files)
     document: dict[str, Any] = {
@@ -177,7 +175,7 @@ def _seal_document(
         'stiction_ratio': _value(breakaway.ratio) if breakaway else 0.0,
         'uncertainty': {
             'relative_std': _value(relative),
-            'absolute_std': _value(np.hypot(band.absolute / everyone, alone / seals)),
+            'absolute_std': _value(band.absolute / everyone),
         },
         'identified_pressure': [_value(pressure.min()), _value(pressure.max())],
     }
@@ -190,6 +188,8 @@ def _seal_document(
         document['force_sum_correction'] = asdict(correction)
     document['identification'] = {
         'kind': kind.name,
+        'friction_N': _value(of_kind),
+        'std_of_this_kind_alone_N': _value(found.apart_std[number]),
         'fitted_together_with': [other.name for other in fit.data.kinds if other is not kind],
         'readings': readings.count,
         'data': [file._asdict() for file in sources.files],
@@ -226,7 +226,7 @@ def _warnings_of(result: SeveralKinds) -> Iterator[str]:
         yield (
             f'the friction at no pressure, {constant:.3g} N of all seals ({100.0 * constant / mean:.0f} % of '
             f'the friction),{viscous} cannot be divided between {names} by any pressure of this cylinder: it is '
-            'divided as the rest is, and the standard deviation of each kind holds that: use the seal files together'
+            'divided as the rest is: use the seal files together'
         )
     for name, friction, error in poorly_told_apart(found):
         yield (
