@@ -15,10 +15,9 @@ Source: maximum a posteriori with the covariance of Laplace, [Gelman2013]_ chapt
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.foundation.units import BAR
@@ -38,6 +37,8 @@ OFFSET_PRIOR = (0.0, 1e3, -1e9, 1e9)  # [-] share
 CLUSTER_PRIOR = 0.03  # [-] standard deviation of the friction between clusters, expected
 CLUSTER_FREEDOM = 1.0  # with this weight
 NOTHING = 1e-6  # [-] share that counts as 0
+MOST_STEPS = 100  # of a fit
+CONVERGED = 1e-9  # [-] change of the cost that ends it
 STARTS = (0.1, 0.3, 1.0)  # of v_S over the mean speed, where a fit begins
 
 
@@ -242,7 +243,7 @@ def offsets_by_half_range(readings: FrictionReadings) -> FloatArray:
 
 
 def _solved(problem: _Problem, weight: FloatArray, start: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Vector, and weighted Jacobian and rest with the rows of the prior."""
+    """Vector, and weighted Jacobian and rest with the rows of the prior: Levenberg and Marquardt within bounds."""
     readings, prior = problem.readings, problem.prior
     at, direction = readings.at, readings.at.direction[:, np.newaxis]
     layout = _Layout(len(problem.columns), len(problem.sources))
@@ -258,16 +259,24 @@ def _solved(problem: _Problem, weight: FloatArray, start: FloatArray) -> tuple[F
         return np.concatenate((rest * weight, ahead)), np.vstack((jacobian, np.diag(1.0 / prior[:, 1])))
 
     low, high = prior[:, 2], prior[:, 3]
-    inside = np.clip(start, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
-
-    def rest_of(vector: FloatArray) -> FloatArray:
-        return both(vector)[0]
-
-    def slopes_of(vector: FloatArray) -> FloatArray:
-        return both(vector)[1]
-
-    found: Any = least_squares(rest_of, inside, jac=slopes_of, bounds=(low, high), xtol=1e-8, ftol=1e-8, gtol=1e-8)
-    vector = np.where(np.abs(found.x) < NOTHING, 0.0, found.x)
+    vector = np.clip(start, low, high)
+    rest, jacobian = both(vector)
+    damping = 1e-3
+    for _ in range(MOST_STEPS):
+        gradient, normal = jacobian.T @ rest, jacobian.T @ jacobian
+        free = np.flatnonzero(~((vector <= low) & (gradient > 0.0)) & ~((vector >= high) & (gradient < 0.0)))
+        damped = normal[np.ix_(free, free)] + damping * np.diag(np.diag(normal)[free])
+        tried = vector.copy()
+        tried[free] = np.clip(vector[free] - np.linalg.solve(damped, gradient[free]), low[free], high[free])
+        gain = float(rest @ rest)
+        other, slopes = both(tried)
+        gain -= float(other @ other)
+        damping *= 0.2 if gain > 0.0 else 5.0
+        if gain > 0.0:
+            vector, rest, jacobian = tried, other, slopes
+        if abs(gain) <= CONVERGED * float(rest @ rest):
+            break
+    vector = np.where(np.abs(vector) < NOTHING, 0.0, vector)
     rest, jacobian = both(vector)
     return vector, jacobian, rest
 
