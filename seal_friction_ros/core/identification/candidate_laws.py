@@ -80,6 +80,7 @@ class CandidateLaw:
     fixed: ParameterValues = field(default_factory=dict)  # parameters that are not fitted
     parts: Mapping[str, Any] = field(default_factory=dict)
     """known fields of the law: geometry and normal force; empty if it needs neither"""
+    has_prior: bool = False  # whether all its terms are fitted at once, with a prior on each (`friction_model`)
 
     @property
     def depends_on_pressure(self) -> bool:
@@ -165,7 +166,7 @@ _WITHOUT_SPEEDS = (('asymmetric', 'asymmetry', ('asymmetry',)),)
 class Variation(NamedTuple):
     """What the readings vary, which decides what they can identify."""
 
-    pressures: int = 3  # distinct ones, up to 3: with fewer, the rise over pressure is a prior
+    pressures: int = 3  # distinct ones, up to 3: with fewer, the rise over pressure is a prior; 0: friction made them
     speeds: bool = True  # the speed varies at one pressure and direction: velocity terms
     asymmetry: bool = True  # sources hold several pressures: asymmetry, which else is an offset
     exponent: bool = True  # there are enough pressures for a free pressure exponent
@@ -184,6 +185,8 @@ def candidate_laws(
     parts = {'geometry': geometry, 'normal_force_law': normal_force_law} if geometry and normal_force_law else {}
     bases = [_base(law_type, parts, variation.speeds) for law_type in FRICTION_LAWS]
     constant, *laws = [base for base in bases if base is not None]
+    if variation.pressures == 0:
+        return (constant, *with_velocity_terms(constant, variation))
     if variation.pressures < 3:
         return (_with_prior(next(law for law in laws if law.law_type is PressurePowerLaw), variation.pressures),)
     found = [constant, *(with_velocity_terms(constant, variation) if variation.speeds else ())]
@@ -210,6 +213,18 @@ def with_velocity_terms(base: CandidateLaw, variation: Variation) -> tuple[Candi
         for suffix, terms, names in (_WITH_SPEEDS if variation.speeds else _WITHOUT_SPEEDS)
         if variation.asymmetry or 'asymmetry' not in names
     )
+
+
+def law_of_all_terms(variation: Variation) -> CandidateLaw:
+    """The pressure power law, or constant friction, with every velocity term that the data can tell and a prior."""
+    law_type = PressurePowerLaw if variation.pressures else ConstantCoulomb
+    told = {'asymmetry'} if variation.asymmetry else set()
+    told |= {'viscous_friction', 'stribeck_friction', 'stribeck_velocity'} if variation.speeds else set()
+    terms = tuple(p for p in fitted_parameters(VelocityTerms) if p.name in told)
+    parts = {'viscous_friction': 'viscous', 'stribeck_friction': 'Stribeck', 'asymmetry': 'asymmetry'}
+    formula = ' + '.join([law_type.FORMULA, *(parts[p.name] for p in terms if p.name in parts)])
+    parameters = (*fitted_parameters(law_type), *terms)
+    return CandidateLaw('all_terms', f'{formula}, each with a prior', law_type, parameters, has_prior=True)
 
 
 def _with_exponent(law: CandidateLaw, suffix: str, exponent: float) -> CandidateLaw:

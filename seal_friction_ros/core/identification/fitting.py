@@ -9,6 +9,7 @@ from scipy.optimize import least_squares, nnls
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, OperatingConditions, ParameterValues
+from seal_friction_ros.core.identification.friction_model import ModelFit, Told, fit_model
 from seal_friction_ros.core.identification.readings import FrictionReadings
 
 ILL_CONDITIONED = 30.0  # condition number of the scaled Jacobian; after [Belsley1980]_
@@ -31,6 +32,7 @@ class LawFit:
     offsets: FloatArray  # [N] offset of the force sum of each source, shape (sources,)
     jacobian: FloatArray
     """derivative of the weighted deviations by the parameters, offsets eliminated, shape (n, parameters)"""
+    model: ModelFit | None = None  # of a law whose terms have a prior
 
     def friction(self, at: OperatingConditions) -> FloatArray:
         """Magnitude of the friction of all seals [N], shape (n,)."""
@@ -48,11 +50,11 @@ class LawFit:
 
         A lower bound of 0 is a term that the data do not show, which is sound.
         """
-        for parameter in self.law.parameters:
+        for parameter in () if self.model is not None else self.law.parameters:
             value, margin = self.values[parameter.name], 1e-6 * (parameter.upper - parameter.lower)
             if value > parameter.upper - margin or (parameter.lower != 0.0 and value < parameter.lower + margin):
                 return f'{parameter.name} is at its bound of {value:.3g}'
-        if not self.condition_number <= ILL_CONDITIONED:
+        if self.model is None and not self.condition_number <= ILL_CONDITIONED:
             return f'ill-conditioned: condition number {self.condition_number:.0f} (good below {ILL_CONDITIONED:.0f})'
         return ''
 
@@ -98,6 +100,8 @@ def fit(
     Raises:
         ValueError: The result is not finite.
     """
+    if law.has_prior:
+        return _fit_with_prior(law, readings)
     if LINEAR.issuperset(parameter.name for parameter in law.parameters):
         return _fit_linear(law, readings)
     lower, upper = np.array([(p.lower, p.upper) for p in law.parameters]).T
@@ -123,6 +127,30 @@ def fit(
     at_zero = (lower == 0.0) & (np.abs(best.x) < 1e-6 * np.abs(list(first_guess.values())))
     values = law.named(np.where(at_zero, 0.0, best.x))  # exactly 0 for a term without effect, instead of about 1e-18
     return LawFit(law, values, offsets_of(readings, law.friction(readings.at, values)), np.asarray(best.jac))
+
+
+def _fit_with_prior(law: CandidateLaw, readings: FrictionReadings) -> LawFit:
+    """As `fit`, for a law of all terms: the most probable one."""
+    seals, terms = readings.at.pressure.shape[1], law.velocity_terms
+    told = Told('viscous_friction' in terms, 'stribeck_friction' in terms, 'asymmetry' in terms, areas=False)
+    model = fit_model(readings, [tuple(range(seals))] if law.depends_on_pressure else [], told)
+    return LawFit(law, values_of_model(law, model, seals), model.offsets, model.rows, model)
+
+
+def values_of_model(law: CandidateLaw, model: ModelFit, seals: int) -> dict[str, float]:
+    """Parameters of one seal of the law of all terms."""
+    falling, speed = model.stribeck
+    values = {
+        'coulomb_friction_at_any_pressure': model.constant / seals,
+        'friction_at_no_pressure': model.constant / seals,
+        'viscous_friction': model.viscous / seals,
+        'stribeck_friction': falling / seals,
+        'stribeck_velocity': speed,
+        'asymmetry': model.asymmetry,
+    }
+    if law.depends_on_pressure:
+        values |= {'friction_at_one_bar': float(model.rises[0]), 'pressure_exponent': model.exponents[0]}
+    return {parameter.name: values[parameter.name] for parameter in law.parameters}
 
 
 def _fit_linear(law: CandidateLaw, readings: FrictionReadings) -> LawFit:

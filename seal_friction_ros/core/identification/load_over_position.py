@@ -23,6 +23,7 @@ from scipy.interpolate import CubicSpline
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.foundation.units import BAR
+from seal_friction_ros.core.friction.mounting import pressures_at_seals
 from seal_friction_ros.core.identification.signal_preparation import (
     LONGEST_GAP,
     Signals,
@@ -366,15 +367,15 @@ _Choices = list[tuple[int, ...]]  # numbers of the terms of each choice
 
 
 def _pressure_terms(means: _Means, chambers: Sequence[str]) -> tuple[_Terms, _Choices]:
-    """Friction over pressure: none, P^m summed over the seals, or of one chamber; one exponent at a time."""
+    """Friction over pressure: none, P^m summed over what the seals see, or of one chamber; one exponent at a time."""
     bar = means.pressures / BAR
-    mixes = {tuple(sorted('ab'.index(chamber) for chamber in chambers)): 'seals'}
-    mixes = {(0,): 'a', (1,): 'b'} | mixes
+    seals = pressures_at_seals(chambers, *bar.T)
+    seen = {'seals': seals} | {name: bar[:, [i]] for i, name in enumerate('ab') if [*chambers] != [name]}
     terms = [
-        (f'P_{name}^{m:.3g}', (bar[:, index] ** m).sum(axis=1))
-        for index, name in sorted(mixes.items(), key=lambda mix: mix[1] != 'seals')
+        (f'P_{name}^{m:.3g}', (pressure**m).sum(axis=1))
+        for name, pressure in seen.items()
         for m in EXPONENTS
-        if np.ptp(bar[:, index]) > 0.0
+        if np.ptp(pressure) > 0.0
     ]
     return terms, [(), *((i,) for i in range(len(terms)))]
 

@@ -12,6 +12,7 @@ import numpy as np
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.friction.mounting import pressures_at_seals
 from seal_friction_ros.core.identification import signal_preparation
+from seal_friction_ros.core.identification.admission import NOT_FINITE
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
 from seal_friction_ros.core.identification.readings import (
     FrictionReadings,
@@ -23,6 +24,7 @@ from seal_friction_ros.core.identification.readings import (
     check_readings,
     has_pressures,
 )
+from seal_friction_ros.core.identification.what_a_log_tells import free_rod
 
 BLOCKS = 10  # contiguous parts of a swept log, each predicted from the others
 HELD_LOG = 0.8  # of the even samples in strokes at held speed and pressure: each stroke is a reading (our choice)
@@ -55,9 +57,14 @@ def prepare_logs(logs: Sequence[RecordedLog], chambers: Sequence[str]) -> Prepar
         readings, chamber_pressures = _held(logs, of_strokes, chambers)
         breakaway = _breakaway(logs, chambers, readings)
         counts = held
+    free = free_rod([log.signals for log in logs], even)
+    if free is not None:
+        one_level = replace(readings, free_rod=free, level=np.zeros_like(readings.level))
+        readings = with_predictable_groups(one_level)
+        breakaway = breakaway and replace(breakaway, free_rod=free, level=np.zeros_like(breakaway.level))
     check_readings(readings)
     used = {log.name: count for log, count in zip(logs, counts, strict=True)}
-    total = {log.name: len(log.signals.time) for log in logs}
+    total = {log.name: len(log.signals.time) + sum(log.dropped.values()) for log in logs}
     return PreparedReadings(readings, chamber_pressures, breakaway, used, total, _left_out(logs, even, sum(counts)))
 
 
@@ -193,13 +200,16 @@ def _swept(
 
 def _left_out(logs: Sequence[RecordedLog], even: Sequence[BoolArray], used: int) -> dict[str, int]:
     """Reason -> number of samples not used."""
-    counts = {'not finite': 0, 'at rest': 0, 'accelerated': 0, 'in no even stroke': -used}
+    reasons = (NOT_FINITE, 'at rest', 'accelerated', 'in no even stroke')
+    counts = dict(zip(reasons, (0, 0, 0, -used), strict=True))
     for log, index in zip(logs, even, strict=True):
         finite = np.logical_and.reduce([np.isfinite(column) for column in log.signals])
         with np.errstate(invalid='ignore'):
             moving = np.abs(log.signals.velocity) > log.sliding.slowest
         masks = (~finite, finite & ~moving, finite & moving & ~index, index)
-        counts = {reason: counts[reason] + int(mask.sum()) for reason, mask in zip(counts, masks, strict=True)}
+        parts = zip(reasons, masks, strict=True)
+        counts |= {reason: counts[reason] + int(mask.sum()) for reason, mask in parts}
+        counts |= {reason: counts.get(reason, 0) + count for reason, count in log.dropped.items()}
     return {reason: count for reason, count in counts.items() if count}
 
 

@@ -4,6 +4,7 @@ Each error of a check is one line: source, fault, and what to do.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -24,6 +25,7 @@ from seal_friction_ros.core.identification.signal_preparation import (
     is_ambient,
     longest_stretch,
 )
+from seal_friction_ros.core.identification.what_a_log_tells import FreeRod
 
 FEWEST_PRESSURES = 3  # any line fits two points; a third one tests it: with fewer a prior takes the place of the third
 LONGEST_NAN = 0.5  # [s] a longer stretch without a value is a sensor fault (our choice)
@@ -46,6 +48,7 @@ class RecordedLog(NamedTuple):
     sliding: Sliding
     temperature: FloatArray | None = None  # [K] of each sample; None if not recorded
     position: FloatArray | None = None  # [m] likewise
+    dropped: Mapping[str, int] = {}  # reason -> number of samples that are not in the signals
 
 
 class ManualReadings(NamedTuple):
@@ -79,6 +82,7 @@ class FrictionReadings:
     """[s] time at rest before each breakaway, shape (n,); empty if unknown"""
     temperature: FloatArray = field(default_factory=lambda: np.empty(0))
     """[K] of each reading, shape (n,); empty if unknown"""
+    free_rod: FreeRod | None = None  # if the pressures are the effect of the friction, and tell nothing of it
 
     @property
     def count(self) -> int:
@@ -314,6 +318,8 @@ def _check_bounds(name: str, pressure: FloatArray, speed: FloatArray, force: Flo
 
 def has_pressures(readings: FrictionReadings) -> bool:
     """Whether the readings show how friction depends on pressure: enough pressures, far enough apart."""
+    if readings.free_rod is not None:
+        return False
     enough = readings.are_samples or len(readings.levels) >= FEWEST_PRESSURES
     return enough and are_far_apart(readings.seal_pressure)
 
@@ -325,7 +331,7 @@ def are_far_apart(pressures: FloatArray) -> bool:
 
 def _check_pressures(where: str, readings: FrictionReadings) -> None:
     """Check readings that do not show how friction depends on pressure."""
-    if has_pressures(readings):
+    if has_pressures(readings) or readings.free_rod is not None:
         return
     pressures = readings.seal_pressure
     if float(pressures.max()) < NARROWEST_PRESSURES:

@@ -19,6 +19,7 @@ from seal_friction_ros.core.identification.candidate_laws import (
     EXPONENTS,
     CandidateLaw,
     Variation,
+    law_of_all_terms,
     with_velocity_terms,
 )
 from seal_friction_ros.core.identification.fitting import LawFit, fit
@@ -28,6 +29,7 @@ from seal_friction_ros.core.identification.validation import CrossValidation, Ti
 BEATEN_CONFIDENCE = 0.95  # of the test whether a law is beaten (our choice)
 WORTHWHILE = 0.1  # share of its loss by which a law must be beaten (our choice)
 MANY_TIMES = 2.0  # a law whose loss is as many times that of another is beaten, however few the groups (our choice)
+BETTER = 0.05  # share of its loss by which all terms with a prior are better than the best law (our choice)
 NEAR = 2.0  # a sound law is near if its loss is at most as many times that of the best (our choice)
 RISES = 2.0  # standard errors of the rise over the pressures from which friction rises (our choice): 2 % false alarms
 OVERDISPERSED = 0.01  # probability of the residuals of a law below which pressures scatter by themselves (our choice)
@@ -54,11 +56,20 @@ def variation_of(readings: FrictionReadings) -> Variation:
     several = [len(np.unique(readings.level[readings.source == source])) > 1 for source in np.unique(readings.source)]
     levels = len(readings.levels)
     return Variation(
-        pressures=3 if has_pressures(readings) else min(levels, 2) if are_far_apart(readings.seal_pressure) else 1,
+        pressures=_pressures(readings),
         speeds=bool(np.isfinite(speed).all()) and float(np.mean(faster or [False])) > 0.5,
         asymmetry=any(several) and all(len(index) for index in readings.two_sided),
         exponent=readings.are_samples or levels >= FEWEST_PRESSURES_FOR_EXPONENT,
     )
+
+
+def _pressures(readings: FrictionReadings) -> int:
+    """Pressures that tell something of the friction: up to 3; 0 if they are its effect."""
+    if readings.free_rod is not None:
+        return 0
+    if has_pressures(readings):
+        return 3
+    return min(len(readings.levels), 2) if are_far_apart(readings.seal_pressure) else 1
 
 
 class Rise(NamedTuple):
@@ -163,10 +174,11 @@ def score_ladder(
     scores = score_laws(laws, readings, tick)
     scored = [score for score in scores if score.losses is not None and score.law.depends_on_pressure]
     if not scored:
-        return scores
+        return (*scores, *score_laws([law_of_all_terms(variation)] * (variation.pressures == 0), readings, tick))
     sound = [score for score in scored if score.fit is not None and not score.fit.why_unsound]
     best = min(sound or scored, key=mean_loss)
-    return (*scores, *score_laws(with_velocity_terms(best.law, variation), readings, tick))
+    more = [*with_velocity_terms(best.law, variation), *[law_of_all_terms(variation)] * (variation.pressures == 3)]
+    return (*scores, *score_laws(more, readings, tick))
 
 
 def score_laws(
@@ -181,9 +193,9 @@ def score_laws(
     start_values: dict[str, float] = {}
     others = regroupings(readings)
     for law in laws:
-        levels, count = len(readings.levels), len(law.parameters)
+        levels, count = len(readings.levels), len(law.parameters) - len(law.velocity_terms)
         needed = count + (readings.left_out_by == 'pressure')
-        if not readings.are_samples and levels < needed:
+        if not readings.are_samples and not law.has_prior and levels < needed:
             scores.append(LawScore(law, why_not=f'{count} parameters need {needed} pressures, there are {levels}'))
         else:
             try:
@@ -239,6 +251,10 @@ def recommended(scores: Sequence[LawScore], rise: Rise | None = None) -> LawScor
     sound = [score for score in scored if score.fit is not None and not score.fit.why_unsound]
     if sound and min(map(mean_loss, sound)) <= NEAR * least:
         scored = sound
+    best = min(scored, key=mean_loss)
+    if best.law.has_prior and all(mean_loss(best) < (1.0 - BETTER) * mean_loss(s) for s in scored if s is not best):
+        return best
+    scored = [score for score in scored if not score.law.has_prior] or scored
     best = min(scored, key=mean_loss)
     left = [score for score in scored if not is_beaten(losses_of(score), losses_of(best), many_times=rise is None)]
     fewest = min(len(score.law.parameters) for score in left)
@@ -328,15 +344,15 @@ def choose_without(
 def collinear_spread(scores: Sequence[LawScore], selected: LawFit, readings: FrictionReadings) -> float:
     """Relative spread of laws that fit nearly as well, where speed and pressure part [-]: the data cannot tell them.
 
-    Laws within `NEAR` of the best are compared at every pair of a speed and a pressure (quartiles of each), also those
+    Sound laws within `NEAR` of the best are compared at every pair of a speed and a pressure (quartiles of each), also
     pairs that never occurred: where speed and pressure always changed together, laws agree on the readings and differ
     there. The spread is the root mean square deviation from the ``selected`` law. 0 for held readings.
     """
     if not readings.are_samples:
         return 0.0
-    scored = [score for score in scores if score.fit is not None and score.losses is not None]
-    least = min(float(score.losses.mean()) for score in scored if score.losses is not None)
-    near = [s.fit for s in scored if s.fit is not None and s.losses is not None and s.losses.mean() <= NEAR * least]
+    least = min(mean_loss(score) for score in scores if score.losses is not None)
+    fits = [score.fit for score in scores if score.losses is not None and mean_loss(score) <= NEAR * least]
+    near = [found for found in fits if found is not None and not found.why_unsound]
     shares = (0.125, 0.375, 0.625, 0.875)
     speeds = np.quantile(np.abs(readings.at.velocity), shares)
     order = np.argsort(readings.seal_pressure)

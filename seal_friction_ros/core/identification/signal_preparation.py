@@ -26,7 +26,6 @@ SAME_LEVEL = 0.2  # of the pressure: two directions of one log that differ less 
 AMBIENT = 1.0e5  # [Pa] of the air, absolute
 AMBIENT_WIDTH = 1.2e4  # [Pa] from it, by weather, altitude and sensor (our choice)
 HELD_COUNTS = 5.0  # steps of the sensor: a signal that ranges no further is held, by whatever dithers (our choice)
-LONGEST_BRIDGE = 2  # samples in a row without a value that are interpolated (our choice)
 LEVEL_WIDTH = 0.1  # of the highest pressure: a wider level is a ramp and is divided into equal parts
 
 
@@ -92,28 +91,6 @@ class OffsetLine(NamedTuple):
     constant: float  # [N] of the load cell
     area_error: float  # [m^2] error of the area in the pressure force
     rms: float  # [N] of the residuals
-
-
-def bridged(signals: Signals) -> tuple[Signals, dict[str, int]]:
-    """Signals with short holes filled in, straight between their neighbours, and the number of values by signal.
-
-    A hole is up to `LONGEST_BRIDGE` values that are not finite, between two that are and not further apart than
-    `LONGEST_GAP`.
-    """
-    filled, counts = signals, {}
-    for name, column in zip(signals._fields[1:], signals[1:], strict=True):
-        known = np.flatnonzero(np.isfinite(column))
-        lacking = np.setdiff1d(np.arange(len(column)), known)
-        after = np.searchsorted(known, lacking)
-        inside = lacking[(after > 0) & (after < len(known))]
-        left, right = (known[np.searchsorted(known, inside) + side] for side in (-1, 0))
-        is_short = (right - left <= LONGEST_BRIDGE + 1) & (signals.time[right] - signals.time[left] <= LONGEST_GAP)
-        holes = inside[is_short]
-        if len(holes):
-            whole = column.copy()
-            whole[holes] = np.interp(signals.time[holes], signals.time[known], column[known])
-            filled, counts[name] = filled._replace(**{name: whole}), len(holes)
-    return filled, counts
 
 
 def slope(time: FloatArray, values: FloatArray, law: SavitzkyGolay) -> FloatArray:

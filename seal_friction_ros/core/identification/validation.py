@@ -6,7 +6,7 @@ readings give the same result.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,8 +14,9 @@ from scipy.optimize import nnls
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
+from seal_friction_ros.core.identification import friction_model
 from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, ParameterValues
-from seal_friction_ros.core.identification.fitting import fit, offsets_of, root_mean_square
+from seal_friction_ros.core.identification.fitting import fit, offsets_of, root_mean_square, values_of_model
 from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.signal_preparation import half_range
 
@@ -54,6 +55,8 @@ def cross_validate(
 
     The fits start ``near`` the parameters of the fit to all readings. ``tick`` is called with 1 after each fit.
     """
+    if law.has_prior:
+        return _left_out_of_model(law, readings)
     predicted, deviation = np.empty(readings.count), np.empty(readings.count)
     parameters = []
     for out, (others, left_out) in zip(readings.groups, readings.splits, strict=True):
@@ -61,6 +64,17 @@ def cross_validate(
         parameters.append([values[p.name] for p in law.parameters])
         tick(1)
     return CrossValidation(predicted, deviation, group_losses(readings, deviation), np.array(parameters))
+
+
+def _left_out_of_model(law: CandidateLaw, readings: FrictionReadings) -> CrossValidation:
+    """As `cross_validate`, for a law of all terms."""
+    model = fit(law, readings).model
+    assert model is not None  # noqa: S101  for mypy: the law has a prior
+    predicted, deviation, vectors = friction_model.left_out(model, readings)
+    seals = readings.at.pressure.shape[1]
+    values = [values_of_model(law, replace(model, vector=vector), seals) for vector in vectors]
+    parameters = np.array([[each[p.name] for p in law.parameters] for each in values])
+    return CrossValidation(predicted, deviation, group_losses(readings, deviation), parameters)
 
 
 def predict(

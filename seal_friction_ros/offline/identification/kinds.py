@@ -86,6 +86,11 @@ def identify_kinds(
             'give bags or logs'
         )
     prepared = sources.prepare()
+    if prepared.readings.free_rod is not None:
+        raise ValueError(
+            f'{paths[0]}: nothing but friction loads the rod, so the pressures are the effect of the friction and '
+            'tell no kinds apart: load the rod and record the load, or drive with several supply or return pressures'
+        )
     data = kinds_readings(prepared.readings, prepared.chamber_pressures, kinds)
     found = fit_kinds(data, largest_error)
     if not _error(found) <= LARGEST_ERROR:
@@ -95,7 +100,7 @@ def identify_kinds(
         )
     readings = found.fit.corrected_readings()
     friction = found.fit.frictions(readings.at).sum(axis=1)
-    between = runs.between_runs(readings, friction, found.fit.offsets)
+    between = runs.between_runs(readings, friction, found.fit.model.offsets)
     if run_to_run is not None:
         between = between._replace(std=run_to_run)
     of_band = run_to_run if run_to_run is not None else between.of_band
@@ -103,7 +108,7 @@ def identify_kinds(
     breakaway = None
     if prepared.breakaway is not None and len(prepared.breakaway.groups) >= 2:
         coulomb = found.fit.coulomb_friction(prepared.breakaway.at)
-        breakaway = fit_breakaway(prepared.breakaway, coulomb, found.fit.offsets)
+        breakaway = fit_breakaway(prepared.breakaway, coulomb, found.fit.model.offsets)
     documents = {
         kind.name: _seal_document(sources, found, k, band, breakaway, f'{name}_{kind.name}')
         for k, kind in enumerate(kinds)
@@ -118,8 +123,10 @@ def _value(value: float) -> float:
 
 def law_texts(fit: KindsFit) -> list[str]:
     """Law of each kind, in words."""
-    return [f'{kind.name}: f_0 + k P^{m:.3g}' + (' + viscous' if fit.rung.viscous else '')
-            for kind, m in zip(fit.data.kinds, fit.rung.exponents, strict=True)]  # fmt: skip
+    values = {'viscous': fit.model.viscous, 'Stribeck': fit.model.stribeck[0], 'asymmetry': fit.model.asymmetry}
+    terms = ''.join(f' + {name}' for name, value in values.items() if value)
+    kinds = zip(fit.data.kinds, fit.model.exponents, strict=True)
+    return [f'{kind.name}: f_0 + k P^{m:.3g}{terms}' for kind, m in kinds]
 
 
 def _seal_document(
@@ -132,7 +139,8 @@ def _seal_document(
 ) -> dict[str, Any]:
     """Seal file of one kind, checked as the node checks it.
 
-    Its standard deviation holds that of all seals, and what the data and this cylinder do not tell apart.
+    Its standard deviation is its share of that of all seals together, also at pressures that were not driven; that of
+    the kind alone is in the section ``identification``.
 
     Raises:
         ValueError: The law makes no valid seal.
@@ -142,10 +150,7 @@ def _seal_document(
     of_kind = float(fit.frictions(readings.at)[:, number].mean())
     share = float(fit.division[number]) / seals
     everyone = readings.at.pressure.shape[1]
-    apart = float(np.hypot(found.errors[number], found.spread[number])) / max(of_kind, 1e-12)
-    has_share = of_kind > 0.0
-    relative = float(np.hypot(band.relative, apart)) if has_share else band.relative
-    alone = float(found.division_std[number]) if has_share else float(found.apart_std[number])
+    relative = float(np.hypot(band.relative, found.unseen_std))
     pressure = readings.at.pressure[:, fit.data.columns_of(number)]
     files = ', '.join(file.name for file in sources.files)
     document: dict[str, Any] = {
@@ -155,19 +160,22 @@ def _seal_document(
         'mounting': {'chambers': list(kind.chambers)},
         'coulomb_law': 'pressure_power_law',
         'pressure_power_law': {
-            'friction_at_no_pressure': _value(share * fit.constant),
-            'friction_at_one_bar': _value(fit.rises[number]),
-            'pressure_exponent': _value(fit.rung.exponents[number]),
+            'friction_at_no_pressure': _value(share * fit.model.constant),
+            'friction_at_one_bar': _value(fit.model.rises[number]),
+            'pressure_exponent': _value(fit.model.exponents[number]),
         },
     }
-    if fit.rung.viscous:
-        document['velocity_terms'] = {'viscous_friction': _value(share * fit.viscous)}
+    falling, speed_of_fall = fit.model.stribeck
+    terms = {'viscous_friction': share * fit.model.viscous, 'asymmetry': fit.model.asymmetry}
+    terms |= {'stribeck_friction': share * falling, 'stribeck_velocity': speed_of_fall} if falling else {}
+    if any(terms.values()):
+        document['velocity_terms'] = {term: _value(value) for term, value in terms.items()}
     document |= {
         'stiction': _value(breakaway.stiction) if breakaway else 0.0,
         'stiction_ratio': _value(breakaway.ratio) if breakaway else 0.0,
         'uncertainty': {
             'relative_std': _value(relative),
-            'absolute_std': _value(np.hypot(band.absolute / everyone, alone / seals)),
+            'absolute_std': _value(band.absolute / everyone),
         },
         'identified_pressure': [_value(pressure.min()), _value(pressure.max())],
     }
@@ -180,6 +188,8 @@ def _seal_document(
         document['force_sum_correction'] = asdict(correction)
     document['identification'] = {
         'kind': kind.name,
+        'friction_N': _value(of_kind),
+        'std_of_this_kind_alone_N': _value(found.apart_std[number]),
         'fitted_together_with': [other.name for other in fit.data.kinds if other is not kind],
         'readings': readings.count,
         'data': [file._asdict() for file in sources.files],
@@ -192,11 +202,11 @@ def _correction(fit: KindsFit, *, contains_load: bool) -> ForceSumCorrection | N
     """Areas and offset that the force sum lacks, if they matter; the same in the file of each kind."""
     readings = fit.data.readings
     two_sided = [source for source, index in enumerate(readings.two_sided) if len(index)]
-    offset = -float(np.mean(fit.offsets[two_sided])) if two_sided else 0.0
-    matters = fit.rung.areas or abs(offset) >= NOTICED * float(fit.frictions(readings.at).sum(axis=1).mean())
+    offset = -float(np.mean(fit.model.offsets[two_sided])) if two_sided else 0.0
+    matters = fit.model.areas.any() or abs(offset) >= NOTICED * float(fit.frictions(readings.at).sum(axis=1).mean())
     if not matters and not contains_load:
         return None
-    area_a, area_b = (_value(-area) for area in fit.areas)
+    area_a, area_b = (_value(-area) for area in fit.model.areas)
     zero = _value(offset) if matters else 0.0
     return ForceSumCorrection(area_a=area_a, area_b=area_b, offset=zero, contains_load=contains_load)
 
@@ -211,24 +221,24 @@ def _warnings_of(result: SeveralKinds) -> Iterator[str]:
     fit, found = result.found.fit, result.found
     names = ' and '.join(kind.name for kind in fit.data.kinds)
     mean = float(fit.frictions(fit.data.readings.at).sum(axis=1).mean())
-    viscous = ' and the viscous friction' if fit.rung.viscous else ''
-    if fit.constant > 0.0 or fit.viscous > 0.0:
+    constant, viscous = fit.model.constant, ' and the viscous friction' if fit.model.viscous else ''
+    if constant > 0.0 or fit.model.viscous > 0.0:
         yield (
-            f'the friction at no pressure, {fit.constant:.3g} N of all seals ({100.0 * fit.constant / mean:.0f} % of '
+            f'the friction at no pressure, {constant:.3g} N of all seals ({100.0 * constant / mean:.0f} % of '
             f'the friction),{viscous} cannot be divided between {names} by any pressure of this cylinder: it is '
-            'divided as the rest is, and the standard deviation of each kind holds that: use the seal files together'
+            'divided as the rest is: use the seal files together'
         )
     for name, friction, error in poorly_told_apart(found):
         yield (
             f'{name}: {friction:.3g} N with a standard error of {error:.2g} N, which --largest-kind-error lets pass: '
             'the sum of all kinds is better known than each: use the seal files in this cylinder only'
         )
-    for kind, part in zip(fit.data.kinds, fit.rises.tolist(), strict=True):
-        if part == 0.0:
+    for kind, part in zip(fit.data.kinds, fit.model.parts.tolist(), strict=True):
+        if part < 1e-3 * mean:
             yield f'{kind.name}: these data show no friction that rises with its pressure'
-    if fit.rung.areas:
+    if fit.model.areas.any():
         change = ' and '.join(
-            f'{-1e6 * area:+.3g} mm2 for chamber {c}' for c, area in zip('ab', fit.areas, strict=True)
+            f'{-1e6 * area:+.3g} mm2 for chamber {c}' for c, area in zip('ab', fit.model.areas, strict=True)
         )
         yield f'the areas in the force sum are off: {change}; the laws are fitted with the corrected areas'
     between = result.between_runs
@@ -251,16 +261,19 @@ def kinds_numbers(result: SeveralKinds) -> dict[str, Any]:
     found, fit = result.found, result.found.fit
     readings = fit.corrected_readings()
     total = fit.frictions(readings.at).sum(axis=1)
-    measured = readings.magnitudes(fit.offsets)
-    conditions, correlation = proposed_conditions(fit.data, found.rivals)
+    measured = readings.magnitudes(fit.model.offsets)
+    conditions, correlation = proposed_conditions(fit.data, fit)
 
     means = partial(_level_means, readings)
     return {
         'law': '; '.join(law_texts(fit)),
         'kinds': [_kind_numbers(found, k) for k in range(len(fit.data.kinds))],
         'seal_chambers': list(result.sources.chambers),
-        'friction_at_no_pressure_N': _value(fit.constant),
-        'viscous_friction': _value(fit.viscous),
+        'friction_at_no_pressure_N': _value(fit.model.constant),
+        'viscous_friction': _value(fit.model.viscous),
+        'stribeck_friction': _value(fit.model.stribeck[0]),
+        'stribeck_velocity': _value(fit.model.stribeck[1]),
+        'asymmetry': _value(fit.model.asymmetry),
         'correlation': [[_value(value) for value in row] for row in found.correlation],
         'pressure_a_Pa': means(fit.data.chamber_pressures[:, 0]),
         'pressure_b_Pa': means(fit.data.chamber_pressures[:, 1]),
@@ -270,12 +283,10 @@ def kinds_numbers(result: SeveralKinds) -> dict[str, Any]:
         'left_out_N': means(found.predicted),
         'left_out_by': readings.left_out_by,
         'cross_validation_error': _value(result.error),
-        'area_correction_m2': [_value(-area) for area in fit.areas],
-        'offset_N': [_value(offset) for offset in fit.offsets],
+        'area_correction_m2': [_value(-area) for area in fit.model.areas],
+        'offset_N': [_value(offset) for offset in fit.model.offsets],
         'between_run_std': _value(result.between_runs.std),
         'breakaway': result.breakaway and result.breakaway._asdict(),
-        'laws_tried': found.tried,
-        'laws_not_beaten': len(found.rivals),
         'readings': readings.count,
         'next': [{'pressure_a_Pa': _value(c.a), 'pressure_b_Pa': _value(c.b)} for c in conditions],
         'next_correlation': _value(correlation),
@@ -299,12 +310,11 @@ def _kind_numbers(found: KindsIdentification, k: int) -> dict[str, Any]:
         'name': kind.name,
         'seal_chambers': list(kind.chambers),
         'law': law_texts(fit)[k],
-        'pressure_exponent': fit.rung.exponents[k],
-        'friction_at_one_bar': _value(fit.rises[k]),
+        'pressure_exponent': _value(fit.model.exponents[k]),
+        'friction_at_one_bar': _value(fit.model.rises[k]),
         'friction_N': _value(friction.mean()),
-        'rising_N': _value(fit.parts[k]),
-        'rising_standard_error_N': _value(found.errors[k]),
-        'law_spread_N': _value(found.spread[k]),
+        'rising_N': _value(fit.model.parts[k]),
+        'rising_standard_error_N': _value(fit.model.errors[k]),
         'division_std_N': _value(found.division_std[k]),
         'share': _value(share[k]),
         'share_std': _value(share_std[k]),
@@ -325,7 +335,7 @@ def kinds_summary(result: SeveralKinds) -> str:
         lines.append(f'  {kind.name:16}  {",".join(kind.chambers):16} {numbers}')
     lines += [f'law of {text}' for text in law_texts(fit)]
     lines += [f'left-out readings: off by {100.0 * result.error:.1f} % ({fit.data.readings.left_out_by} left out)']
-    conditions, correlation = proposed_conditions(fit.data, found.rivals)
+    conditions, correlation = proposed_conditions(fit.data, fit)
     if conditions:
         pairs = ', '.join(f'{c.a / BAR:.3g} and {c.b / BAR:.3g}' for c in conditions)
         change = f'correlation of the pressures {float(found.together.max()):.2f} -> {correlation:.2f}'
@@ -341,7 +351,7 @@ def next_runs_text(result: SeveralKinds) -> str:
     A log holds the readings of several kinds, so the rows are driven while recording, and nothing is filled in.
     """
     found, readings = result.found, result.found.fit.data.readings
-    conditions, correlation = proposed_conditions(found.fit.data, found.rivals)
+    conditions, correlation = proposed_conditions(found.fit.data, found.fit)
     before = float(found.together.max())
     speed = float(np.nan_to_num(np.abs(readings.at.velocity)).mean()) / MM
     lines = [

@@ -67,7 +67,7 @@ from seal_friction_ros.offline.work.finished_parts import Part, content_of, part
 from seal_friction_ros.offline.work.places import Place
 from seal_friction_ros.offline.work.progress import progress
 
-MOST_EXTENSIONS = 3  # of a law by velocity terms
+MOST_EXTENSIONS = 4  # of a law by velocity terms, and the law of all terms
 FEWEST_TO_COMPARE = 4  # pressures by which the settled seal is compared with the readings as measured (our choice)
 LARGEST_ERROR = 0.5  # out-of-sample error above which a law is not saved (our choice)
 REFERENCE_SEAL = 'ms28775_114'  # its area deformation gain (finite elements) is used if no other is known

@@ -13,9 +13,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
+from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.stamps import repaired_stamps
 from seal_friction_ros.core.foundation.units import UNITS, ZEROS
+from seal_friction_ros.core.identification.admission import (
+    BEYOND_LOAD,
+    NOT_FINITE,
+    SAME_STAMP,
+    Order,
+    bridged,
+    check_admitted,
+    in_order,
+)
 from seal_friction_ros.core.identification.force_correction import ForceCorrection
 from seal_friction_ros.core.identification.load_over_position import (
     LoadOverPosition,
@@ -26,7 +35,7 @@ from seal_friction_ros.core.identification.load_over_position import (
 )
 from seal_friction_ros.core.identification.prepare_readings import prepare_logs, prepare_manual_readings
 from seal_friction_ros.core.identification.readings import ManualReadings, PreparedReadings, RecordedLog, check_clipping
-from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding, bridged
+from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding
 from seal_friction_ros.files import config_path, share_directory
 from seal_friction_ros.offline.bags.actuator_bag import open_actuator
 from seal_friction_ros.offline.bags.columns import read_velocity_rows
@@ -42,7 +51,6 @@ LARGEST_ACCELERATION = 1.0  # [m/s2] limit with known inertia (our choice)
 DIRECTIONS = {'extend': 1, 'ext': 1, '1': 1, '+1': 1, 'retract': -1, 'ret': -1, '-1': -1}
 KINDS = {'dynamic': 0, 'static': 1}
 PRESSURE_UNITS = {'psig': 'psi', 'psi': 'psi', 'bar': 'bar', 'kpa': 'kPa', 'mpa': 'MPa', 'pa': 'Pa'}
-PRESSURES = frozenset(PRESSURE_UNITS.values())
 FRICTION_UNITS = {'lbf': 'lbf', 'n': 'N', 'kn': 'kN'}
 VELOCITY_UNITS = {'m_per_s': 'm/s', 'mm_per_s': 'mm/s', 'in_per_s': 'in/s'}
 
@@ -214,18 +222,21 @@ def without_load_of(source: Source, chambers: Sequence[str], options: SourceOpti
     """
     if source.log is None or source.load_position is None:
         return source
-    name, signals, sliding, temperature, position = source.log
+    name, signals, sliding, temperature, position, dropped = source.log
     try:
         load = fit_load(signals, source.load_position, chambers, sliding)
     except ValueError as error:
         raise ValueError(f'{name}: {error}') from None
     cleaned = without_load(signals, source.load_position, load, sliding)
     texts = tuple(f'{name}: {text}' for text in (load_text(load), *load.warnings))
+    dropped = {**dropped, BEYOND_LOAD: len(signals.time) - len(cleaned.time)}
     if options.largest_acceleration is None:
         limit = min(max(sliding.largest_acceleration, known_acceleration(load)), LARGEST_ACCELERATION)
         sliding = replace(sliding, largest_acceleration=limit)
     return source._replace(
-        log=RecordedLog(name, cleaned, sliding, temperature, position), load=load, remarks=(*source.remarks, *texts)
+        log=RecordedLog(name, cleaned, sliding, temperature, position, dropped),
+        load=load,
+        remarks=(*source.remarks, *texts),
     )
 
 
@@ -250,15 +261,13 @@ def _read_log(path: Path, options: SourceOptions) -> Source:
     samples, sliding = log.samples, _sliding(rig.sliding, options)
     moving = np.abs(samples.velocity) > sliding.slowest
     for term, column in log.columns.items():
-        if term is not rig.time:
-            where, is_pressure = f'signal in column {term.column_name or term.column}', term.unit in PRESSURES
+        if term.is_a('pressure') or term.is_a('force'):  # a position at an end stop stands still by right
+            where, is_pressure = f'signal in column {term.column_name or term.column}', term.is_a('pressure')
             check_clipping(path.name, where, column[moving] * UNITS[term.unit], is_pressure=is_pressure)
     seconds = (samples.stamp - samples.stamp[0]) * 1e-9
     signals = Signals(seconds, samples.velocity, samples.chamber_a, samples.chamber_b, samples.force_sum)
-    signals, texts = _bridged(path.name, signals)
-    remarks = (*remarks, *texts)
-    recorded = RecordedLog(path.name, signals, sliding, log.temperature, log.position)
-    remarks = (*remarks, *(f'{path.name}: {text}' for text in log.remarks))
+    recorded, texts = _admitted(RecordedLog(path.name, signals, sliding, log.temperature, log.position), options)
+    remarks = (*remarks, *texts, *(f'{path.name}: {text}' for text in log.remarks))
     source = Source(_data_file(path), None, recorded, pressure_area=_pressure_area(rig), remarks=remarks)
     if log.position is None or rig.load == 'none':
         return source
@@ -316,42 +325,57 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
         holds_load = configuration.parameters().estimator.force_sum_correction.contains_load
         has_placeholder, chambers = configuration.has_placeholder, configuration.selection.seal_chambers
         document = None if has_placeholder else configuration.seal_documents[0]
-    kept = np.diff(np.maximum.accumulate(stamp), prepend=stamp[:1] - 1) > 0  # stamps above all stamps before
+    repaired = [f'{bag.name}: {text}' for text in repair.said('the stamp of the velocity')]
+    order = in_order(stamp)
     columns[~(np.abs(columns) < 1e15)] = np.nan  # [SI] no measurement is as large
-    signals = Signals((stamp - stamp[:1].sum()) * 1e-9, *columns[:4]).taken(kept)
-    temperature = _from_the_first(columns[5] + ZEROS['degC'])[kept] if topics.temperature else None
-    position = columns[4][kept] if topics.position else None
-    signals, texts = _bridged(bag.name, signals)
-    texts = (
-        *(f'{bag.name}: {text}' for text in (*repair.said('the stamp of the velocity'), *_not_later(kept))),
-        *texts,
+    columns = columns[:, order.rows]
+    temperature = _from_the_first(columns[5] + ZEROS['degC']) if topics.temperature else None
+    position = columns[4] if topics.position else None
+    dropped = {SAME_STAMP: order.same_stamp} if order.same_stamp else {}
+    log = _admitted(
+        RecordedLog(bag.name, Signals(order.seconds, *columns[:4]), Sliding(), temperature, position, dropped), options
     )
-    log = RecordedLog(bag.name, signals, _sliding(Sliding(), options), temperature, position)
     places = position if holds_load else None
     return Source(
         _data_file(path),
         chambers,
-        log,
+        log.log,
         seal_document=document,
         has_placeholder=has_placeholder,
         load_position=places,
-        remarks=texts,
+        remarks=(*repaired, *log.remarks, *_order_texts(bag.name, order)),
     )
 
 
-def _not_later(kept: BoolArray) -> list[str]:
-    """Samples that are left out, since they are stamped no later than one before."""
-    count = int((~kept).sum())
-    return [f'{count} of {len(kept)} samples left out: stamped no later than one before'] if count else []
+class _Admitted(NamedTuple):
+    log: RecordedLog
+    remarks: tuple[str, ...]
 
 
-def _bridged(name: str, signals: Signals) -> tuple[Signals, tuple[str, ...]]:
-    """Signals without single missing values, and what was filled in."""
-    filled, counts = bridged(signals)
-    said = ', '.join(f'{count} of {what.replace("_", " ")}' for what, count in counts.items())
-    return filled, (
-        f'{name}: of {len(signals.time)} samples single missing values interpolated: {said}',
-    ) if said else ()
+def _admitted(log: RecordedLog, options: SourceOptions) -> _Admitted:
+    """The log with single missing values bridged, and remarks on it.
+
+    Raises:
+        ValueError: Too many samples are faulty.
+    """
+    columns, masks = zip(*(bridged(column) for column in log.signals[1:]), strict=True)
+    count = int(np.logical_or.reduce(masks).sum())
+    signals = Signals(log.signals.time, *columns)
+    missing = int((~np.isfinite(np.array(columns)).all(axis=0)).sum())
+    check_admitted(log.name, len(signals.time) + sum(log.dropped.values()), {**log.dropped, NOT_FINITE: missing})
+    texts = (f'{log.name}: {count} samples had no value, and are on a straight line between their neighbours',)
+    return _Admitted(log._replace(signals=signals, sliding=_sliding(log.sliding, options)), texts * (count > 0))
+
+
+def _order_texts(name: str, order: Order) -> Iterator[str]:
+    """What was done about stamps that were out of order."""
+    if order.is_sorted:
+        yield f'{name}: the messages came out of order, and were sorted by their stamps'
+    if order.segments > 1:
+        yield (
+            f'{name}: stamps step back {order.segments - 1} times (a looped playback, a clock that was set, or a stamp '
+            f'of the future): {order.segments} segments are used, one after the other'
+        )
 
 
 def _from_the_first(temperature: FloatArray) -> FloatArray:

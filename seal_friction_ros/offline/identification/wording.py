@@ -7,12 +7,14 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.units import BAR, ZEROS
 from seal_friction_ros.core.identification import diagnostics
+from seal_friction_ros.core.identification.admission import FAULTS, WORTH_A_WARNING
 from seal_friction_ros.core.identification.breakaway import BreakawayFit
 from seal_friction_ros.core.identification.force_correction import ForceCorrection
 from seal_friction_ros.core.identification.readings import has_pressures
 from seal_friction_ros.core.identification.run_in import SettledLaw
 from seal_friction_ros.core.identification.runs import BetweenRuns
 from seal_friction_ros.core.identification.temperature import TemperatureFit
+from seal_friction_ros.core.identification.what_a_log_tells import FreeRod
 from seal_friction_ros.offline.identification.presliding import presliding_text
 from seal_friction_ros.offline.identification.results import (
     Identification,
@@ -30,6 +32,7 @@ def warnings_of(
 ) -> Iterator[str]:
     """Limits of the law that its user has to know, one line each."""
     readings = data.prepared.readings
+    yield from _dropped_texts(data)
     yield from _change_texts(quality)
     one_way = [name for name, index in zip(readings.names, readings.two_sided, strict=True) if not len(index)]
     if one_way:
@@ -37,7 +40,9 @@ def warnings_of(
             f'{", ".join(one_way)}: readings in one direction only, so an offset of the force counts as friction: '
             'measure the other direction too'
         )
-    if not has_pressures(readings):
+    if readings.free_rod is not None:
+        yield _free_rod_text(readings.free_rod)
+    elif not has_pressures(readings):
         low, high = (float(end) / BAR for end in (readings.seal_pressure.min(), readings.seal_pressure.max()))
         yield (
             f'measured at {low:.4g} to {high:.4g} bar only: there the law holds; how friction rises beyond comes from '
@@ -57,6 +62,23 @@ def warnings_of(
         yield _dwell_text(quality.breakaway)
     if quality.breakaway is None and not readings.are_samples:
         yield 'no stroke starts from rest, so breakaway is not identified: let the rod rest 30 s before some strokes'
+
+
+def _dropped_texts(data: IdentificationData) -> Iterator[str]:
+    total, dropped = sum(data.prepared.total.values()), data.prepared.left_out
+    for reason in FAULTS:
+        count = dropped.get(reason, 0)
+        if count > WORTH_A_WARNING * total:
+            yield f'{count} of {total} samples ({100.0 * count / total:.0f} %) are dropped: {reason}'
+
+
+def _free_rod_text(found: FreeRod) -> str:
+    return (
+        'pressure dependence: unknown. Nothing but friction loads the rod, so the pressures are the effect of the '
+        f'friction: the force sum is a function of them alone, friction takes {found.paid / BAR:.3g} bar, and the '
+        f'emptied chamber moved by {found.moved / BAR:.2g} bar on its own. The law has no pressure in it: load the rod '
+        'and record the load, or drive with several supply or return pressures'
+    )
 
 
 def _change_texts(quality: LawQuality) -> Iterator[str]:

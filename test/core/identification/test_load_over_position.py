@@ -96,6 +96,15 @@ def test_friction_is_within_5_percent_and_load_within_2_percent(machine, motion,
         assert largest < 0.05  # at the lowest load, where 2 % are 110 N
 
 
+@pytest.mark.parametrize('chambers', [('difference',), ('b', 'difference'), ('ambient', 'a')])
+def test_the_load_is_separated_whatever_the_seals_see(chambers):
+    run = boom.simulate(Boom(), 'both')
+    log = boom.measured(run, 0)
+    load = fit_load(signals_of(log), log.position, chambers, SLIDING)
+    true = float(np.mean(np.abs(run.friction[np.abs(run.velocity) > 5e-3])))
+    assert load.friction.mean == pytest.approx(true, rel=0.05)
+
+
 def test_friction_follows_the_pressure_within_5_percent():
     machine = Boom(gain=200.0, coulomb=1.6e3)
     run = boom.simulate(machine, 'both')

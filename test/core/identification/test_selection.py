@@ -341,9 +341,9 @@ def test_the_best_sound_law_that_depends_on_pressure_is_tried_again_with_speeds(
     chosen = [LAWS[name] for name in ('constant_coulomb', 'pressure_power_law_1', 'pressure_power_law_2')]
     scores = score_ladder(chosen, made, Variation(), ticks.append)
     names = [each.law.name for each in scores]
-    assert names == ['constant_coulomb', 'pressure_power_law_1', 'pressure_power_law_2',
-                     *(f'pressure_power_law_1_{more}' for more in ('viscous', 'stribeck', 'asymmetric'))]  # fmt: skip
-    assert ticks == [1] * 6
+    more = [f'pressure_power_law_1_{terms}' for terms in ('viscous', 'stribeck', 'asymmetric')]
+    assert names == ['constant_coulomb', 'pressure_power_law_1', 'pressure_power_law_2', *more, 'all_terms']
+    assert ticks == [1] * 7
     assert all(len(each.losses) == 6 for each in scores)
     # Friction that rises with P^2.5 is best met by a free exponent, which stays at its bound of 2: it is not sound.
     steep = replace(made, force=made.at.direction * (3.0 + 0.01 * (made.seal_pressure / BAR) ** 2.5))
@@ -389,7 +389,7 @@ def test_groups_may_be_computed_by_another_and_stay_in_order():
 def near(slope, power, times=1.0):
     """A score of a law of 20 N that also follows speed and pressure."""
     friction = SimpleNamespace(
-        friction=lambda at: 20.0 + slope * np.abs(at.velocity) + power * at.pressure.mean(axis=1) / BAR
+        why_unsound='', friction=lambda at: 20.0 + slope * np.abs(at.velocity) + power * at.pressure.mean(axis=1) / BAR
     )
     return LawScore(LAWS[CONSTANT], friction, None, times * EVEN)
 
@@ -416,9 +416,14 @@ def test_laws_that_fit_nearly_as_well_spread_where_speed_and_pressure_part():
     assert collinear_spread([best, near(100.0, 0.0, 2.1)], chosen, made) == 0.0
     assert collinear_spread([near(0.0, 0.0, 0.1), near(100.0, 0.0, 0.21)], chosen, made) == 0.0
     assert collinear_spread([best, LawScore(LAWS[CONSTANT], why_not='too few')], chosen, made) == 0.0
+    unsound = near(100.0, 0.0)
+    unsound.fit.why_unsound = 'asymmetry is at its bound of -0.9'
+    assert collinear_spread([best, unsound], chosen, made) == 0.0
     assert collinear_spread([near(100.0, 0.0)], chosen, replace(made, are_samples=False)) == 0.0
-    uneven = SimpleNamespace(friction=lambda at: np.where(at.direction > 0.0, 24.0, 20.0) + 0.0 * at.velocity)
+    uneven = SimpleNamespace(
+        why_unsound='', friction=lambda at: np.where(at.direction > 0.0, 24.0, 20.0) + 0.0 * at.velocity
+    )
     one = LawScore(LAWS[CONSTANT], uneven, None, EVEN)
     assert collinear_spread([one], chosen, made) == pytest.approx(np.sqrt(np.mean([0.2**2, 0.0])))  # both directions
-    signed = SimpleNamespace(friction=lambda at: 20.0 + 1e3 * (at.direction != np.sign(at.velocity)))
+    signed = SimpleNamespace(why_unsound='', friction=lambda at: 20.0 + 1e3 * (at.direction != np.sign(at.velocity)))
     assert collinear_spread([LawScore(LAWS[CONSTANT], signed, None, EVEN)], chosen, made) == 0.0

@@ -11,7 +11,6 @@ from seal_friction_ros.core.identification.signal_preparation import (
     Signals,
     Sliding,
     breakaways,
-    bridged,
     clipped_share,
     even_sliding,
     half_range,
@@ -454,18 +453,3 @@ def test_a_held_pressure_that_dithers_between_counts_is_not_clipped(counts):
     dither[1000:1100] = max(counts)
     assert clipped_share(dither) == 0.0
     assert clipped_share(np.concatenate((dither, np.linspace(20.0, 60.0, 5000)))) > 0.0
-
-
-def test_single_missing_values_are_bridged_and_counted_and_longer_holes_stay():
-    signals = trapezoid([0.02, -0.02])
-    force, velocity = signals.force_sum.copy(), signals.velocity.copy()
-    force[[50, 90, 91]] = np.nan
-    force[200:203] = np.nan
-    force[0] = np.inf
-    velocity[120] = np.nan
-    filled, counts = bridged(signals._replace(force_sum=force, velocity=velocity))
-    assert counts == {'velocity': 1, 'force_sum': 3}
-    assert np.flatnonzero(~np.isfinite(filled.force_sum)).tolist() == [0, 200, 201, 202]
-    assert filled.force_sum[90] == pytest.approx(signals.force_sum[90])
-    assert filled.velocity[120] == pytest.approx(signals.velocity[120])
-    assert bridged(signals) == (signals, {})

@@ -110,15 +110,18 @@ def test_kinds_that_are_poorly_told_apart_are_taken_if_asked_and_their_deviation
     logs = write_log(tmp_path, motion)
     refused = Run(tmp_path, *logs, *KINDS)
     assert refused.code == 2
-    assert 'the friction of rod cannot be told from that of the others: 60.7 N with a standard error' in refused.errors
+    assert 'the friction of rod cannot be told from that of the others: 47.8 N with a standard error' in refused.errors
     asked = refused.errors.strip().rpartition('or take it with that error: ')[2].split()
     run = Run(tmp_path, *logs, *KINDS, *asked)
     assert run.code == 0, run.errors
-    assert run.has_warning('rod: 60.7 N', '--largest-kind-error', 'use the seal files in this cylinder only')
+    assert run.has_warning('rod: 47.8 N', '--largest-kind-error', 'use the seal files in this cylinder only')
     off = np.array(run.figures['fitted_N']) / np.array(run.figures['measured_N']) - 1.0
     assert np.abs(off).max() < 0.05  # the sum of both is known
     rod, piston = (read_yaml(Path(path)) for path in run.figures['seal_files'].values())
-    assert min(rod['uncertainty']['relative_std'], piston['uncertainty']['relative_std']) > 0.2
+    for seal in (rod, piston):
+        alone = seal['identification']
+        assert alone['std_of_this_kind_alone_N'] > 0.2 * alone['friction_N']
+        assert seal['uncertainty']['relative_std'] < 0.2  # of both together
     for a, b in ((100.0, 100.0), (0.0, 60.0)):  # not driven
         truth = rod_friction(a * BAR) + piston_friction((a - b) * BAR) + 150.0 * 0.03
         friction, std = mounted_friction(run, a, b, 0.03)

@@ -1,0 +1,64 @@
+"""One model with a prior on every term: what data tell is found, and what they do not tell stays in the covariance."""
+
+import numpy as np
+import pytest
+
+from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
+from seal_friction_ros.core.identification.friction_model import Told, fit_model, left_out
+from seal_friction_ros.core.identification.readings import FrictionReadings
+
+BAR = 1e5  # [Pa]
+ALL = Told(viscous=True, stribeck=True, asymmetry=True, areas=False)
+
+
+def readings(friction, bars=(5, 10, 20, 40, 60, 80), speeds=(0.01, 0.02, 0.05, 0.1), noise=0.002, offset=5.0):
+    """Each speed in both directions at each pressure; ``friction`` [N] over pressure [bar], speed and direction."""
+    rng = np.random.default_rng(1)
+    rows = [(i, p, v, side) for i, p in enumerate(bars) for v in speeds for side in (1.0, -1.0) for _ in range(2)]
+    level, pressure, speed, side = np.array(rows).T
+    force = side * friction(pressure, speed, side) * (1.0 + noise * rng.normal(size=len(side))) + offset
+    at = OperatingConditions(pressure[:, np.newaxis] * BAR, None, side * speed, side)
+    level = level.astype(int)
+    return FrictionReadings(at, force, np.zeros_like(level), level, level, ('log',), 'pressure', are_samples=False)
+
+
+def test_every_term_is_found():
+    made = readings(lambda p, v, s: (20.0 + 3.0 * p**0.8 + 100.0 * v + 15.0 * np.exp(-v / 0.02)) * (1.0 + 0.1 * s))
+    found = fit_model(made, [(0,)], ALL)
+    assert found.exponents == pytest.approx((0.8,), abs=0.02)
+    assert found.asymmetry == pytest.approx(0.1, abs=0.02)
+    assert found.viscous == pytest.approx(100.0, rel=0.2)
+    assert found.stribeck[0] == pytest.approx(15.0, rel=0.2)
+    truth = made.magnitudes(np.array([5.0]))
+    assert found.friction(made.at) == pytest.approx(truth, rel=0.04)
+
+
+def test_terms_that_are_less_probable_than_none_are_none():
+    found = fit_model(readings(lambda p, v, _: 20.0 + 0.5 * p + 100.0 * v), [(0,)], ALL)
+    assert found.asymmetry == pytest.approx(0.0, abs=1e-4)
+    assert found.stribeck[0] < 1e-3 * found.size
+    assert found.viscous == pytest.approx(100.0, rel=0.05)
+
+
+def test_a_friction_without_pressure_needs_no_kind():
+    found = fit_model(readings(lambda p, v, _: 30.0 + 200.0 * v + 0.0 * p), [], ALL)
+    assert (found.constant, found.viscous) == pytest.approx((30.0, 200.0), rel=0.03)
+
+
+def test_what_the_pressures_do_not_tell_stays_at_its_prior():
+    found = fit_model(readings(lambda p, v, _: 20.0 + 0.5 * p + 0.0 * v, bars=(30, 30.1)), [(0,)], ALL)
+    far = OperatingConditions(np.array([[90.0 * BAR]]), None, np.array([0.03]), np.array([1.0]))
+    near = OperatingConditions(np.array([[30.0 * BAR]]), None, np.array([0.03]), np.array([1.0]))
+    assert found.friction(near)[0] == pytest.approx(35.0, rel=0.02)
+    assert found.std(near)[0] < 0.05 * 35.0
+    assert found.std(far)[0] > 0.3 * found.friction(far)[0]
+
+
+def test_a_group_left_out_is_predicted_as_by_a_fit_to_the_others():
+    made = readings(lambda p, v, _: 20.0 + 3.0 * p**0.8 + 100.0 * v, noise=0.02)
+    found = fit_model(made, [(0,)], ALL)
+    predicted, deviation, _ = left_out(found, made)
+    for out in made.groups[1:-1]:
+        others = fit_model(made.taken(~out), [(0,)], ALL)
+        assert predicted[out] == pytest.approx(others.friction(made.taken(out).at), rel=0.02)
+    assert np.abs(deviation).mean() == pytest.approx(0.02 * found.size, rel=0.6)

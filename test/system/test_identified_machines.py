@@ -1,0 +1,15 @@
+"""A few machines of `identified_machines`: as good as least squares, and inside the band."""
+
+import pytest
+from identified_machines import MACHINES, MOST, WAYS, score
+
+
+@pytest.mark.parametrize(
+    'name',
+    ['asymmetric', pytest.param('run-in', marks=pytest.mark.long), pytest.param('viscous', marks=pytest.mark.long)],
+)
+def test_the_friction_of_other_motions_is_as_good_as_by_least_squares(name, tmp_path):
+    (machine,) = (each for each in MACHINES if each.name == name)
+    found = score(machine, WAYS['several'], 1, tmp_path)
+    assert found.identify < max(MOST * found.squares, 0.005)  # half a percent is good enough
+    assert found.inside >= 0.9
