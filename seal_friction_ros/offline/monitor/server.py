@@ -80,7 +80,7 @@ class MonitorServer:
         self.page, self.policy = make_page()
         self.streams = 0
         try:
-            self.socket = socket.create_server((ADDRESS, port))  # with SO_REUSEADDR: a page of the last start may be open
+            self.socket = socket.create_server((ADDRESS, port))  # with SO_REUSEADDR
         except (OSError, OverflowError) as error:
             raise ValueError(f'port {port}: {error}: choose another one with --port, 0 for any') from None
         self.socket.setblocking(False)
