@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 from harness.browser import Page, browser, chromium
 
 WIDTHS = (1400, 420)  # [px]
+PAPER = 688  # [px] A4 less margins of 14 mm
 SMALLEST_TEXT = 11  # [px]
 LARGEST = 5 << 20  # [bytes] of a page
 
@@ -38,6 +39,8 @@ NOT_READ_ALOUD = """[
     (h, i, all) => +h.tagName[1] > (i ? +all[i - 1].tagName[1] : 0) + 1).map(h => `${h.textContent}: skips a level`),
   ...[...document.querySelectorAll('.scroll:not([tabindex="0"][aria-label])')].map(e => e.outerHTML.slice(0, 80)),
   ...[...document.querySelectorAll('img')].filter(e => !e.alt).map(e => e.closest('figure').id)]"""
+WIDE = """[...document.querySelectorAll('main *')].filter(e => e.getBoundingClientRect().right > innerWidth + 1)
+  .map(e => e.outerHTML.slice(0, 80))"""
 CHECKS = {
     'cut': CUT, 'letter by letter': LETTERS, 'too small': SMALL, 'not drawn': UNDRAWN, 'not read aloud': NOT_READ_ALOUD,
 }  # fmt: skip
@@ -78,3 +81,13 @@ def check_in_browser(path: Path) -> None:
         found['requests'] = [url for url in tab.requests if not url.startswith('data:')][1:]
         wrong = {name: value for name, value in found.items() if value}
         assert not wrong, f'{path} at {width} px: {wrong}'
+    assert not (wide := wide_on_paper(opened(path, PAPER))), f'{path} on paper: {wide}'
+
+
+def wide_on_paper(tab: Page) -> list[str]:
+    """Elements that are cut off where a page is printed on A4."""
+    tab.call('Emulation.setEmulatedMedia', media='print')
+    try:
+        return list(tab.value(WIDE))
+    finally:
+        tab.call('Emulation.setEmulatedMedia', media='')

@@ -115,7 +115,7 @@ def detail_window(run: RecordedRun, levels: Sequence[PressureLevel]) -> tuple[in
     return max(middle - half, 0), min(middle + half, len(run.time) - 1), None
 
 
-def _usable(run: RecordedRun) -> BoolArray:
+def usable_inputs(run: RecordedRun) -> BoolArray:
     """Where the inputs have a range that says something about the axes."""
     usable: BoolArray = run.status & int(_FAULTS) == 0
     return usable
@@ -129,7 +129,7 @@ def _draw_friction(ax: Axes, run: RecordedRun, part: slice, level: PressureLevel
     """Force sum and estimate over time; with a level of which the offset matters, the force sum less the offset too."""
     rows = part.start + np.argsort(run.time[part], kind='stable')
     time, coulomb, std = run.time[rows], run.coulomb_friction[rows], run.coulomb_friction_std[rows]
-    force_sum, usable = run.force_sum[rows], _usable(run)[rows]
+    force_sum, usable = run.force_sum[rows], usable_inputs(run)[rows]
     largest = max(_largest(values[usable]) for values in (run.breakaway_force[rows], force_sum))
     unit, size = force_unit(largest)
     kept = style.thinned(coulomb)
@@ -175,7 +175,7 @@ def _draw_states(ax: Axes, run: RecordedRun, part: slice) -> None:
 
 def inputs_figure(run: RecordedRun) -> Plot:
     """Inputs of the estimator over time."""
-    usable = _usable(run)
+    usable = usable_inputs(run)
     low, high = style.usable_range(usable, run.pressure / BAR)
     first, last = float(run.time.min()), float(run.time.max())
     title = f'Inputs: {low:.1f} to {high:.1f} bar, {last - first:.0f} s'
@@ -283,7 +283,7 @@ def sliding_velocity_figure(run: RecordedRun, levels: Sequence[PressureLevel]) -
         title = f'Sliding friction grows from {low} to {high}'
     elif levels and all(level.both_directions and level.measured > 0.0 for level in levels):
         title = 'Friction changes its sign with the direction of motion'
-    usable = _usable(run)
+    usable = usable_inputs(run)
     fastest = _largest(run.velocity[usable])
     speed_name, speed_size = speed_unit(fastest)
     largest = max(_largest(run.force_sum[usable]), _largest(run.friction_force[usable]))
