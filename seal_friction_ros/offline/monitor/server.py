@@ -223,7 +223,7 @@ class _Handler(RequestHandler):
                 frame['diagnostics'], told = json.loads(diagnostics), diagnostics
             self.write(b'data: ' + _json(frame) + b'\n\n')
             await asyncio.wait_for(self.flush(), _TIMEOUT)
-            due = max(due + FRAME_PERIOD, loop.time())
+            due = max(due + FRAME_PERIOD, loop.time() - FRAME_PERIOD)  # up to one frame is made up for
             await asyncio.sleep(due - loop.time())
 
     async def _change(self) -> None:
