@@ -15,6 +15,7 @@ OPTIONAL = {
     'jinja2': 'python3-jinja2',
     'zstandard': 'python3-zstandard',
     'lz4': 'python3-lz4',
+    'tornado': 'python3-tornado',
     'rich': 'python3-rich',
     'argcomplete': 'python3-argcomplete',
     'distributed': '',

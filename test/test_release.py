@@ -27,7 +27,7 @@ def test_the_lowest_versions_in_the_docs_are_those_that_are_tested():
     listed = (ROOT / 'requirements' / 'lowest.txt').read_text().partition('# What the tests')[0]
     page = (ROOT / 'docs' / 'installation.md').read_text()
     for name, version in re.findall(
-        r'^(numpy|scipy|matplotlib|numba|Jinja2|PyYAML|mcap|rosbags|rich)==([\d.]+)', listed, re.MULTILINE
+        r'^(numpy|scipy|matplotlib|numba|Jinja2|PyYAML|mcap|rosbags|rich|tornado)==([\d.]+)', listed, re.MULTILINE
     ):
         assert f'{version}' in page, name
 

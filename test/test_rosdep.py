@@ -15,7 +15,9 @@ from paths import ROOT
 
 COPIES = ROOT / 'test' / 'rosdep'
 FROM_PYPI = {'mcap-ros2-support', 'rosbags'}
-FOR_COMMANDS = {f'python3-{name}' for name in ('scipy', 'numba', 'matplotlib', 'jinja2', 'argcomplete', 'rich')}
+FOR_COMMANDS = {
+    f'python3-{name}' for name in ('scipy', 'numba', 'matplotlib', 'jinja2', 'argcomplete', 'rich', 'tornado')
+}
 
 
 def rosdep(folder: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:

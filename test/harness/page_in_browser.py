@@ -10,32 +10,41 @@ from tempfile import TemporaryDirectory
 from harness.browser import Page, browser, chromium
 
 WIDTHS = (1400, 420)  # [px]
+PAPER = 688  # [px] A4 less margins of 14 mm
 SMALLEST_TEXT = 11  # [px]
 LARGEST = 5 << 20  # [bytes] of a page
 
 CUT = """(() => {
   const cut = [], width = document.documentElement.clientWidth;
   for (const e of document.querySelectorAll('body *')) {
-    if (e.closest('.scroll, defs, [clip-path], noscript, script')) continue;
+    if (e.closest('.scroll, .u-wrap, script')) continue;
     const box = e.getBoundingClientRect();
     if (!box.width) continue;
     if (box.right > width + 1 || box.left < -1) cut.push(`${e.tagName} ${e.textContent.slice(0, 40)}: beyond the page`);
     const hides = getComputedStyle(e).overflowX !== 'visible';
     if (hides && e.scrollWidth > e.clientWidth + 1) cut.push(`${e.tagName} ${e.textContent.slice(0, 40)}: cut`);
-    if (e.tagName !== 'text') continue;
-    const svg = e.closest('svg').getBoundingClientRect();
-    const inside = box.left > svg.left - 1 && box.right < svg.right + 1;
-    const above = box.top < svg.top - 2 || box.bottom > svg.bottom + 2;
-    if (!inside || above) cut.push(`${e.textContent}: beyond its figure`);
   }
   return cut;
 })()"""
-LETTERS = """[...document.querySelectorAll('td, th')].filter(e => e.textContent.trim().length > 8 && e.clientWidth < 40)
+LETTERS = """[...document.querySelectorAll('table:not(.u-legend) :is(td, th)')].filter(
+  e => e.textContent.trim().length > 8 && e.clientWidth < 40)
   .map(e => e.textContent)"""
-SMALL = f"""[...document.querySelectorAll('.plot text, .plot div, .plot button, .plot h4')]
+SMALL = f"""[...document.querySelectorAll('.plot p, .plot small, .plot th, .plot td')]
   .filter(e => e.textContent && parseFloat(getComputedStyle(e).fontSize) < {SMALLEST_TEXT}).map(e => e.textContent)"""
-UNDRAWN = """[...document.querySelectorAll('figure[id]')].filter(f => !f.querySelector('.panels svg')).map(f => f.id)"""
-CHECKS = {'cut': CUT, 'letter by letter': LETTERS, 'too small': SMALL, 'not drawn': UNDRAWN}
+UNDRAWN = """[...document.querySelectorAll('figure[id]')].filter(f => f.querySelector('.plot')
+  ? !f.querySelector('.panel canvas') || f.querySelector('.panel:not(:has(canvas))')
+  : !f.querySelector('.picture img').clientWidth).map(f => f.id)"""
+NOT_READ_ALOUD = """[
+  ...(document.querySelectorAll('main').length === 1 ? [] : ['one main landmark']),
+  ...[...document.querySelectorAll('h1, h2, h3, h4')].filter(
+    (h, i, all) => +h.tagName[1] > (i ? +all[i - 1].tagName[1] : 0) + 1).map(h => `${h.textContent}: skips a level`),
+  ...[...document.querySelectorAll('.scroll:not([tabindex="0"][aria-label])')].map(e => e.outerHTML.slice(0, 80)),
+  ...[...document.querySelectorAll('img')].filter(e => !e.alt).map(e => e.closest('figure').id)]"""
+WIDE = """[...document.querySelectorAll('main *')].filter(e => e.getBoundingClientRect().right > innerWidth + 1)
+  .map(e => e.outerHTML.slice(0, 80))"""
+CHECKS = {
+    'cut': CUT, 'letter by letter': LETTERS, 'too small': SMALL, 'not drawn': UNDRAWN, 'not read aloud': NOT_READ_ALOUD,
+}  # fmt: skip
 
 
 @cache
@@ -86,3 +95,13 @@ def check_in_browser(path: Path) -> None:
         found['requests'] = [url for url in tab.requests if not url.startswith('data:')][1:]
         wrong = {name: value for name, value in found.items() if value}
         assert not wrong, f'{path} at {width} px: {wrong}'
+    assert not (wide := wide_on_paper(opened(path, PAPER))), f'{path} on paper: {wide}'
+
+
+def wide_on_paper(tab: Page) -> list[str]:
+    """Elements that are cut off where a page is printed on A4."""
+    tab.call('Emulation.setEmulatedMedia', media='print')
+    try:
+        return list(tab.value(WIDE))
+    finally:
+        tab.call('Emulation.setEmulatedMedia', media='')

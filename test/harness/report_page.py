@@ -69,10 +69,11 @@ class Page(HTMLParser):
         assert self.links
         assert all(link.startswith('data:image/svg+xml;base64,') for link in self.links)
         assert set(self.tags).isdisjoint(FOREIGN - {'meta'})
-        assert self.tags.count('script') == len(self.figures) + bool(self.figures) + self.is_sortable
-        style = self.texts['style'][0]
-        assert 'url(' not in style
-        assert '@import' not in style
+        drawn = len(self.texts.get('div.plot', []))
+        assert self.tags.count('script') == drawn + bool(drawn) + self.is_sortable
+        for style in self.texts['style']:
+            assert 'url(' not in style
+            assert '@import' not in style
         assert len(set(self.figures)) == len(self.figures) == len(self.texts['figcaption']) == len(self.links)
         assert all(self.texts['figcaption'])
         folder = self.path.parent / f'{self.path.stem}_figures'

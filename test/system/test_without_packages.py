@@ -70,6 +70,7 @@ def test_replay_compare_and_info_need_numpy_yaml_and_mcap_alone(tmp_path: Path):
         ('scipy', ['tune', '--out', '{}.yaml']),
         ('zstandard', ['info', 'test/corpus/mcap/zstd']),
         ('lz4', ['info', 'test/corpus/mcap/lz4']),
+        ('tornado', ['monitor', PULL_TEST]),
         ('distributed', ['replay', PULL_TEST, '--scheduler', 'tcp://127.0.0.1:1']),
         ('fsspec', ['replay', 'memory://a/bag']),
         ('pyarrow', ['fleet', 'bags', '--out', '{}.html', '--parquet', '{}.parquet']),

@@ -62,8 +62,5 @@ def _show_bag(arguments: argparse.Namespace) -> int:
     token = kept_token(arguments.token_file) if arguments.token_file else ''
     server = MonitorServer(RecordedView(arguments.bag, cli.mapping_of(arguments)), arguments.port, token)
     print(server.told(as_json=arguments.json), flush=True)
-    try:
-        server.serve_forever(poll_interval=0.2)
-    except KeyboardInterrupt:
-        server.server_close()
+    server.serve()
     return cli.SUCCESS

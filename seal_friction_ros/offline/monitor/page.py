@@ -5,7 +5,7 @@ import hashlib
 import re
 from pathlib import Path
 
-_FOLDER = Path(__file__).parent / 'page'
+FOLDER = Path(__file__).parent / 'page'
 _PARTS = ('uPlot.min.css', 'monitor.css', 'uPlot.iife.min.js', 'monitor.js')
 """Files whose text stands in the page, each in the place of its name in braces: ``{{monitor.js}}``."""
 
@@ -15,9 +15,9 @@ def make_page() -> tuple[bytes, str]:
 
     No value of a machine is in the page: all of them come as JSON, and the script writes them as text.
     """
-    text = (_FOLDER / 'monitor.html').read_text()
+    text = (FOLDER / 'monitor.html').read_text()
     for name in _PARTS:
-        text = text.replace(f'{{{{{name}}}}}', (_FOLDER / name).read_text())
+        text = text.replace(f'{{{{{name}}}}}', (FOLDER / name).read_text())
     scripts, styles = (_hashes(text, tag) for tag in ('script', 'style'))
     policy = (
         f"default-src 'none'; script-src {scripts}; style-src {styles}; connect-src 'self'; img-src data:; "

@@ -6,11 +6,9 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap
-from matplotlib.patches import Patch
 
 from seal_friction_ros.core.estimation.records import Status
-from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
+from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.states import FrictionState
@@ -28,6 +26,15 @@ STATE_COLOURS = {
 }
 TIME_LABEL = 'time since the first estimate [s]'
 PRESSURE_LABEL = 'pressure at the seals [bar, gauge]'
+_FAULTS = (
+    Status.PRESSURE_OUT_OF_RANGE
+    | Status.FORCE_OUT_OF_RANGE
+    | Status.VELOCITY_OUT_OF_RANGE
+    | Status.PRESSURE_LEAP
+    | Status.FORCE_LEAP
+    | Status.VELOCITY_LEAP
+)
+"""Status bits of inputs that say nothing about the range of an axis."""
 _DOTS = 12_000  # in the scatter over velocity
 _MARKS = 3000  # of single strokes over pressure
 
@@ -69,18 +76,16 @@ def live_figure(run: RecordedRun, levels: Sequence[PressureLevel]) -> Plot:
     whole, part = slice(0, len(run.time)), slice(first, last + 1)
     for strip, above in ((axes[1], axes[0]), (axes[3], axes[2])):
         strip.sharex(above)
-    style.link(axes[0], TIME_LABEL)
     _draw_friction(axes[0], run, whole, None)
     _draw_states(axes[1], run, whole)
     axes[0].axvspan(run.time[first], run.time[last], color=style.BLACK, alpha=0.08, lw=0)
     _draw_friction(axes[2], run, part, level)
     _draw_states(axes[3], run, part)
     axes[2].set_title('Shaded part' if level is None else f'Shaded part, at {level.pressure / BAR:.1f} bar')
-    present = [state for state in FrictionState if (run.state == state).any()]
-    handles = [Patch(color=STATE_COLOURS[state], label=state.name.lower()) for state in present]
     spacing: dict[str, Any] = {'ncols': 4, 'borderaxespad': 0.0, 'handlelength': 1.0}
-    axes[3].legend(handles=handles, loc='upper right', bbox_to_anchor=(1.0, -1.4), **spacing)
-    axes[3].set_xlabel(TIME_LABEL, loc='left')
+    axes[3].legend(loc='upper right', bbox_to_anchor=(1.0, -1.4), **spacing)
+    for strip in (axes[1], axes[3]):
+        strip.set_xlabel(TIME_LABEL, loc='left')
     if level is not None and _offset_matters(level):
         style.legend_above(axes[2], slice(1, 3))  # the legend of the first panel names the others
     return finished('live_estimate', figure, axes[0], title='Whole bag')
@@ -110,20 +115,27 @@ def detail_window(run: RecordedRun, levels: Sequence[PressureLevel]) -> tuple[in
     return max(middle - half, 0), min(middle + half, len(run.time) - 1), None
 
 
+def usable_inputs(run: RecordedRun) -> BoolArray:
+    """Where the inputs have a range that says something about the axes."""
+    usable: BoolArray = run.status & int(_FAULTS) == 0
+    return usable
+
+
 def _offset_matters(level: PressureLevel) -> bool:
     return level.offset is not None and abs(level.offset) > 0.1 * abs(level.measured)
 
 
 def _draw_friction(ax: Axes, run: RecordedRun, part: slice, level: PressureLevel | None) -> None:
     """Force sum and estimate over time; with a level of which the offset matters, the force sum less the offset too."""
-    time, coulomb, std = run.time[part], run.coulomb_friction[part], run.coulomb_friction_std[part]
-    largest = max(_largest(run.breakaway_force[part]), _largest(run.force_sum[part]))
+    rows = part.start + np.argsort(run.time[part], kind='stable')
+    time, coulomb, std = run.time[rows], run.coulomb_friction[rows], run.coulomb_friction_std[rows]
+    force_sum, usable = run.force_sum[rows], usable_inputs(run)[rows]
+    largest = max(_largest(values[usable]) for values in (run.breakaway_force[rows], force_sum))
     unit, size = force_unit(largest)
     kept = style.thinned(coulomb)
     for side, label in ((1.0, 'Coulomb friction, 95 % band'), (-1.0, None)):
         middle, half = side * coulomb[kept] / size, BAND_95 * std[kept] / size
         style.fill_band(ax, time[kept], middle, half, alpha=0.35, label=label)
-    force_sum = run.force_sum[part]
     if level is not None and _offset_matters(level):
         offset = level.offset or 0.0
         style.thin_line(ax, time, force_sum / size, color=style.GREY, lw=0.8, ls=':', label='force sum')
@@ -132,10 +144,11 @@ def _draw_friction(ax: Axes, run: RecordedRun, part: slice, level: PressureLevel
     else:
         style.thin_line(ax, time, force_sum / size, color=style.BLACK, lw=1.0, label='force sum (measured)')
     look = {'color': style.BLUE, 'lw': 1.6, 'alpha': 0.9, 'label': 'estimated friction force'}
-    style.thin_line(ax, time, run.friction_force[part] / size, **look)
+    style.thin_line(ax, time, run.friction_force[rows] / size, **look)
     style.zero_lines(ax)
     end, limit = time[-1] if time[-1] > time[0] else time[0] + 1.0, 1.15 * largest / size
     ax.set(xlim=(time[0], end), ylim=(-limit, limit), ylabel=f'force [{unit}]')
+    style.mark_beyond(ax, time, force_sum / size)
     ax.tick_params(labelbottom=False)
 
 
@@ -148,22 +161,22 @@ def _largest(values: FloatArray) -> float:
 def _draw_states(ax: Axes, run: RecordedRun, part: slice) -> None:
     """Strip with the state at each column of pixels."""
     time = np.maximum.accumulate(run.time[part])
-    grid = np.linspace(time[0], time[-1], min(style.COLUMNS, 4 * len(time)))
-    held = np.clip(np.searchsorted(time, grid, side='right') - 1, 0, len(time) - 1)
-    end = time[-1] if time[-1] > time[0] else time[0] + 1.0
-    colours = ListedColormap([STATE_COLOURS[state] for state in FrictionState])
-    look: dict[str, Any] = {'cmap': colours, 'vmin': -0.5, 'vmax': len(FrictionState) - 0.5, 'interpolation': 'nearest'}
-    extent = (float(time[0]), float(end), 0.0, 1.0)
-    ax.imshow(run.state[part][held][np.newaxis], aspect='auto', extent=extent, **look)
+    grid = np.linspace(time[0], max(time[-1], time[0] + 1e-3), min(style.DETAIL, 4 * len(time)) + 1)
+    held = run.state[part][np.searchsorted(time, grid, side='right') - 1]
+    for state in FrictionState:
+        if (held == state).any():
+            spans = style.true_spans(grid, held == state)
+            ax.broken_barh(spans, (0.0, 1.0), color=STATE_COLOURS[state], lw=0, label=state.name.lower())
     ax.set_yticks([])
+    ax.set_ylim(0.0, 1.0)
     ax.grid(visible=False)
     ax.set_ylabel('state', rotation=0, ha='right', va='center')
 
 
 def inputs_figure(run: RecordedRun) -> Plot:
     """Inputs of the estimator over time."""
-    pressures = run.pressure[np.isfinite(run.pressure)] / BAR
-    low, high = (float(pressures.min()), float(pressures.max())) if len(pressures) else (0.0, 0.0)
+    usable = usable_inputs(run)
+    low, high = style.usable_range(usable, run.pressure / BAR)
     first, last = float(run.time.min()), float(run.time.max())
     title = f'Inputs: {low:.1f} to {high:.1f} bar, {last - first:.0f} s'
     figure, axes = style.new_figure(title, 5.4, nrows=3, sharex=True)
@@ -172,13 +185,19 @@ def inputs_figure(run: RecordedRun) -> Plot:
     style.thin_line(axes[0], run.time, run.pressure_a / BAR, color=style.BLUE, lw=1.1, label=label)
     if not same:
         style.thin_line(axes[0], run.time, run.pressure_b / BAR, color=style.ORANGE, lw=1.1, label='chamber b')
-    unit, size = speed_unit(_largest(run.velocity))
-    style.thin_line(axes[1], run.time, run.velocity / size, color=style.GREEN, lw=1.0)
+    unit, speed_size = speed_unit(max(map(abs, style.usable_range(usable, run.velocity))))
+    style.thin_line(axes[1], run.time, run.velocity / speed_size, color=style.GREEN, lw=1.0)
     axes[1].set_ylabel(f'rod velocity\n[{unit}]')
-    unit, size = force_unit(_largest(run.force_sum))
+    unit, size = force_unit(max(map(abs, style.usable_range(usable, run.force_sum))))
     style.thin_line(axes[2], run.time, run.force_sum / size, color=style.BLACK, lw=1.0)
+    for ax, *curves in (
+        (axes[0], run.pressure_a / BAR, run.pressure_b / BAR),
+        (axes[1], run.velocity / speed_size),
+        (axes[2], run.force_sum / size),
+    ):
+        style.fit_axis(ax, run.time, usable, *curves)
     axes[2].set(ylabel=f'force sum\n[{unit}]', xlabel=TIME_LABEL, xlim=(first, max(last, first + 1e-3)))
-    return finished('inputs', figure, axes[0], ylabel='pressure\n[bar, gauge]')
+    return finished('inputs', figure, *axes, ylabel='pressure\n[bar, gauge]')
 
 
 def status_figure(run: RecordedRun) -> Plot:
@@ -264,11 +283,15 @@ def sliding_velocity_figure(run: RecordedRun, levels: Sequence[PressureLevel]) -
         title = f'Sliding friction grows from {low} to {high}'
     elif levels and all(level.both_directions and level.measured > 0.0 for level in levels):
         title = 'Friction changes its sign with the direction of motion'
-    speed_name, speed_size = speed_unit(_largest(run.velocity))
-    largest = max(_largest(run.force_sum), _largest(run.friction_force))
+    usable = usable_inputs(run)
+    fastest = _largest(run.velocity[usable])
+    speed_name, speed_size = speed_unit(fastest)
+    largest = max(_largest(run.force_sum[usable]), _largest(run.friction_force[usable]))
     unit, size = force_unit(largest)
     figure, axes = style.new_figure(title, 4.2, ncols=2, sharex=True, sharey=True)
-    good: IntArray = np.flatnonzero(np.isfinite(run.velocity) & np.isfinite(run.force_sum) & np.isfinite(run.pressure))
+    good: IntArray = np.flatnonzero(
+        usable & np.isfinite(run.velocity) & np.isfinite(run.force_sum) & np.isfinite(run.pressure)
+    )
     good = good[:: len(good) // _DOTS + 1]
     good = good[np.argsort(-run.pressure[good], kind='stable')]  # low pressures on top: they reach less far
     panels = ((axes[0], run.force_sum, 'measured: force sum'), (axes[1], run.friction_force, 'estimated'))
@@ -277,7 +300,7 @@ def sliding_velocity_figure(run: RecordedRun, levels: Sequence[PressureLevel]) -
         ax.scatter(run.velocity[good] / speed_size, values[good] / size, c=run.pressure[good] / BAR, **look)
         ax.set(title=name, xlabel=f'rod velocity [{speed_name}]')
         style.zero_lines(ax, vertical=True)
-    limit = 1.15 * _largest(run.velocity) / speed_size
+    limit = 1.15 * fastest / speed_size
     axes[0].set(xlim=(-limit, limit), ylim=(-1.15 * largest / size, 1.15 * largest / size), ylabel=f'force [{unit}]')
     figure.colorbar(axes[1].collections[0], ax=axes, label=PRESSURE_LABEL, pad=0.015)
     return Plot('friction_over_velocity', figure)

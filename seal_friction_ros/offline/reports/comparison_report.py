@@ -18,7 +18,7 @@ from seal_friction_ros.offline.bags.recorded_run import RecordedRun, read_run
 from seal_friction_ros.offline.reports import bag_evaluation, tracking_evaluation, verdicts
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports.bag_evaluation import PressureLevel
-from seal_friction_ros.offline.reports.bag_figures import PRESSURE_LABEL
+from seal_friction_ros.offline.reports.bag_figures import PRESSURE_LABEL, usable_inputs
 from seal_friction_ros.offline.reports.bag_report import data_date, mounted_seals
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, number
@@ -169,9 +169,11 @@ def _pressure_figure(runs: Sequence[_Run], changes: Sequence[Change]) -> Plot:
 
 def _velocity_figure(runs: Sequence[_Run]) -> Plot:
     figure, axes = style.new_figure('Force sum over velocity', 4.0, ncols=2, sharex=True, sharey=True)
-    unit, size = force_unit(max(float(np.nanmax(np.abs(one.run.force_sum), initial=0.0)) for one in runs))
-    for one, ax, (colour, _) in zip(runs, axes, _COLOURS, strict=True):
-        good = np.flatnonzero(np.isfinite(one.run.velocity) & np.isfinite(one.run.force_sum))
+    usable = [usable_inputs(one.run) & np.isfinite(one.run.velocity) & np.isfinite(one.run.force_sum) for one in runs]
+    largest = [np.abs(one.run.force_sum[where]).max(initial=0.0) for one, where in zip(runs, usable, strict=True)]
+    unit, size = force_unit(float(max(largest)))
+    for one, where, ax, (colour, _) in zip(runs, usable, axes, _COLOURS, strict=True):
+        good = np.flatnonzero(where)
         good = good[:: len(good) // _DOTS + 1]
         velocity, force = one.run.velocity[good] / MM, one.run.force_sum[good] / size
         ax.plot(velocity, force, 'o', ms=2.0, color=colour, alpha=0.4, mew=0.0, rasterized=True)

@@ -23,6 +23,7 @@ WIDTH = 8.6  # [inch]
 _LEGEND_HEIGHT = 0.3  # [inch]
 COLUMNS = 1200  # of pixels across a figure
 DETAIL = 6000  # the same for the figure of a page, which is zoomed
+_LONGEST_STEP = 10.0  # usual steps between two values that a line joins (our choice)
 _STYLE = {
     'axes.axisbelow': True,
     'axes.grid': True,
@@ -189,15 +190,57 @@ def thinned(values: FloatArray, columns: int = COLUMNS) -> IntArray:
 
 
 def thin_line(ax: Axes, x: FloatArray, values: FloatArray, **look: Any) -> None:
-    """Line over ``x``, `thinned`; in the figure of the page less so, since one zooms in there."""
-    kept, detailed = thinned(values), thinned(values, DETAIL)
-    line: Any = ax.plot(x[kept], values[kept], **look)[0]
-    line.detail = (x[detailed], values[detailed])
+    """Line over ``x``, `thinned`; in the figure of the page less so, since one zooms in there.
+
+    The line has a gap where no value is for longer than `_LONGEST_STEP` usual steps of ``x``.
+    """
+    order = np.argsort(x, kind='stable')
+    order = order[np.isfinite(values[order])]
+    x, values = x[order], values[order]
+    step = np.diff(x)
+    gaps = np.cumsum(step > _LONGEST_STEP * np.median(step)) if len(step) else np.zeros(0)
+    number = np.concatenate(([0], gaps))[: len(x)]  # of gaps before each value
+    coarse, fine = (_with_gaps(x, values, number, thinned(values, columns)) for columns in (COLUMNS, DETAIL))
+    line: Any = ax.plot(*coarse, **look)[0]
+    line.detail = fine
+    line.resolution = float(x[-1] - x[0]) / DETAIL if len(x) > 4 * DETAIL else 0.0
 
 
-def link(ax: Any, quantity: str) -> None:
-    """Let the x axis move with others of this quantity and these limits on the page, though it has no label."""
-    ax.x_quantity = quantity
+def _with_gaps(x: FloatArray, values: FloatArray, number: FloatArray, kept: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Kept values, and NaN between two with a gap between them."""
+    places = np.flatnonzero(np.diff(number[kept])) + 1
+    return np.insert(x[kept], places, x[kept][places - 1]), np.insert(values[kept], places, np.nan)
+
+
+def usable_range(usable: BoolArray, *curves: FloatArray) -> tuple[float, float]:
+    """Lowest and highest finite value of some curves where they are usable; anywhere, if they never are."""
+    for where in (usable, np.ones_like(usable)):
+        values = np.concatenate([curve[where & np.isfinite(curve)] for curve in curves])
+        if len(values):
+            return float(values.min()), float(values.max())
+    return 0.0, 1.0
+
+
+def fit_axis(ax: Axes, x: FloatArray, usable: BoolArray, *curves: FloatArray) -> None:
+    """Limit the y axis to the `usable_range` of its curves, and `mark_beyond` it."""
+    low, high = usable_range(usable, *curves)
+    pad = 0.06 * (high - low) or 0.01 * abs(high) or 1.0
+    ax.set_ylim(low - pad, high + pad)
+    mark_beyond(ax, x, *curves)
+
+
+def mark_beyond(ax: Axes, x: FloatArray, *curves: FloatArray) -> None:
+    """Mark values beyond the y axis at its edges, with their count."""
+    low, high = ax.get_ylim()
+    for edge, marker, sign in ((high, '^', 1.0), (low, 'v', -1.0)):
+        outside = [sign * np.nan_to_num(curve, nan=0.5 * (low + high)) > sign * edge for curve in curves]
+        if count := sum(int(where.sum()) for where in outside):
+            places = x[np.any(outside, axis=0)]
+            places = places[:: len(places) // COLUMNS + 1]
+            example = next(curve[where][0] for curve, where in zip(curves, outside, strict=True) if where.any())
+            look: dict[str, Any] = {'color': VERMILLION, 'ms': 6.0, 'clip_on': False, 'marker': marker, 'ls': ''}
+            ax.plot(places, np.full(len(places), edge), **look, label=f'{count} beyond, such as {example:.3g}')
+    ax.set_ylim(low, high)
 
 
 def true_spans(time: FloatArray, where: BoolArray) -> list[tuple[float, float]]:

@@ -134,7 +134,7 @@ def write_fleet_report(bags: Sequence[FleetBag], where: Path, out: Path) -> Repo
         rows=_rows(bags, out),
         rigs=rigs,
         text=_text,
-        sorting=script('sorting'),
+        sorting=script('sorting.js'),
     )
     return ReportSummary(out, figures, numbers)
 

@@ -20,6 +20,7 @@ from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.parameters import meanings
 from seal_friction_ros.core.foundation.units import BAR, MM, MPA, MS, PSI, UM
 from seal_friction_ros.files import package_version
+from seal_friction_ros.offline.monitor.page import FOLDER as UPLOT
 from seal_friction_ros.offline.reports.figure_style import Plot, render
 from seal_friction_ros.offline.reports.formatting import length_text, number, pressure_range, pressure_text, thousands
 from seal_friction_ros.offline.reports.plot_data import plot_data
@@ -129,21 +130,22 @@ def render_page(template: str | Path, pictures: dict[str, bytes], plots: dict[st
     Args:
         template: As of `template_of`.
         pictures: Name of a figure -> SVG; a figure that is named in the template but missing here is left out.
-        plots: Name of a figure -> its data, see `plot_data`.
+        plots: Name of a figure -> its data, see `plot_data`; None: the picture alone.
         values: What the template shows.
 
     Raises:
         jinja2.UndefinedError: The template names a value that is not in ``values``.
     """
     encoded = {name: b64encode(svg).decode() for name, svg in pictures.items()}
-    shared = {'script': script('plots'), 'version': package_version(), 'MOST_OPEN': MOST_OPEN}
+    shared = {'script': script, 'version': package_version(), 'MOST_OPEN': MOST_OPEN}
     return template_of(template).render(pictures=encoded, plots=plots, **shared, **values)
 
 
 @cache
 def script(name: str) -> Markup:
-    """A script of ``templates/``, by name without suffix."""
-    return Markup((TEMPLATES / f'{name}.js').read_text(encoding='utf-8'))  # noqa: S704  our own, without a value in it
+    """A script or style of ``templates/``, or uPlot, which the live view has too; by file name."""
+    folder = UPLOT if name.startswith('uPlot') else TEMPLATES
+    return Markup((folder / name).read_text(encoding='utf-8'))  # noqa: S704  without a value in it
 
 
 def write_page(

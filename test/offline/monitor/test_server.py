@@ -21,6 +21,7 @@ from seal_friction_ros.offline.monitor.server import MOST_STREAMS, MonitorServer
 
 SCRIPT = '<script>window.broken = 1</script>'
 SCALE = {'actuator': '/one', 'parameter': 'scale'}
+REFUSED = (400, 403)  # a Host that is no name of a machine at all is refused before it is compared: 400
 TIMEOUT = 30.0  # [s] ends a test that hangs
 
 
@@ -95,16 +96,16 @@ def test_without_the_token_everything_is_403(path: str, body: Any, token: str):
         {'Host': '127.0.0.1:1234567'},
         {'Host': '127.0.0.1/x'},
         {'Host': '127.0.0.1.evil.example'},
-        {'Host': 'localhost '},
+        {'Host': 'localhost x'},
         {'Sec_Fetch_Site': 'cross-site'},
         {'Sec_Fetch_Site': 'same-site'},
     ],
     ids=str,
 )
-def test_another_page_gets_403_even_with_the_token(path: str, body: Any, headers: dict[str, str]):
+def test_another_page_is_refused_even_with_the_token(path: str, body: Any, headers: dict[str, str]):
     switched: list[Any] = []
     with served(view_of(change=lambda wanted: switched.append(wanted) or [])) as server:
-        assert ask(server, path, body=body, **headers)[0] == 403
+        assert ask(server, path, body=body, **headers)[0] in (REFUSED if 'Host' in headers else (403,))
     assert not switched
 
 
@@ -124,7 +125,7 @@ def test_two_hosts_are_none():
         for host in ('127.0.0.1', 'evil.example'):
             connection.putheader('Host', host)
         connection.endheaders()
-        assert connection.getresponse().status == 403
+        assert connection.getresponse().status in REFUSED
         connection.close()
 
 
@@ -301,7 +302,7 @@ def test_a_port_is_free_again_at_once_while_a_page_is_open():
         assert page.recv(15) == b'HTTP/1.1 200 OK'
     again = MonitorServer(view_of(), port)
     assert again.server_port == port
-    again.server_close()
+    again.stop()
     page.close()
 
 

@@ -21,7 +21,7 @@ def test_the_first_start_makes_it_for_one_user_and_the_next_one_takes_it(tmp_pat
     assert kept_token(path) == token != kept_token(tmp_path / 'other')
     server = MonitorServer(LiveView(0), token=token)
     assert server.url.endswith(f'?token={token}')
-    server.server_close()
+    server.stop()
 
 
 @pytest.mark.parametrize('mode', [0o640, 0o604, 0o620, 0o602, 0o666])

@@ -41,7 +41,7 @@ EVERYTHING = """{% extends 'base.html' %}{% from 'macros.html' import figure, no
 @pytest.fixture
 def everything(tmp_path, monkeypatch):
     """Name of a template that has every part, in a folder beside copies of the parts."""
-    for part in ('base.html', 'macros.html', 'plots.js'):
+    for part in ('base.html', 'macros.html', 'figures.js'):
         (tmp_path / part).write_text((TEMPLATES / part).read_text())
     (tmp_path / 'everything.html').write_text(EVERYTHING)
     monkeypatch.setattr(kit, 'TEMPLATES', tmp_path)
