@@ -8,10 +8,7 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationState
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorState
-from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
-from seal_friction_ros.core.estimation.messages import CLOCK_TOPIC, INPUTS
 from seal_friction_ros.core.estimation.pipeline import Turn
-from seal_friction_ros.core.estimation.records import NEVER, NO_ESTIMATE, FrictionEstimate, Status
 from seal_friction_ros.core.estimation.seal_health import (
     SealHealth,
     Starts,
@@ -21,7 +18,9 @@ from seal_friction_ros.core.estimation.seal_health import (
     with_sample,
 )
 from seal_friction_ros.core.estimation.swings import NO_SWING, Swing
-from seal_friction_ros.core.machine.answers_together import NamedAnswer
+from seal_friction_ros.core.messages.layouts import CLOCK_TOPIC, INPUTS
+from seal_friction_ros.core.messages.records import NEVER, NO_ESTIMATE, FeedForward, FrictionEstimate, Limited, Status
+from seal_friction_ros.core.messages.together import NamedAnswer
 from seal_friction_ros.nodes.graph_watch import GraphFindings
 
 _SHORTEST_SILENCE = 0.9  # [s] in a shorter interval, no estimate means no fault if the interval before had one

@@ -28,7 +28,8 @@ from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from seal_friction_msgs.msg import RodVelocity
 
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, encode_text
+from seal_friction_ros.core.messages.coder import encode_text
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 from seal_friction_ros.nodes.friction_monitor import FrictionMonitor

@@ -4,34 +4,16 @@
 bytes; the answers come as bytes, too. The state is that of `pipeline`, so blocks of messages follow each other, with
 single messages between them.
 
-This module decodes and encodes by `messages.LAYOUTS`; everything between is `pipeline`. Messages that do not fit are
+`compiled_coder` decodes and encodes; everything between is `pipeline`. Messages that do not fit are
 refused (`UnsuitedError`); `pipeline.receive` then decides about them.
 """
 
-import struct
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import literal_unroll
 from numba.extending import overload
 
-from seal_friction_ros.core.estimation.feedforward import FeedForward
-from seal_friction_ros.core.estimation.message_blocks import Bytes, Integers, Kind, Messages, UnsuitedError
-from seal_friction_ros.core.estimation.messages import (
-    ESTIMATE_TYPE,
-    FEEDFORWARD_TYPE,
-    FORCE_TYPE,
-    LAYOUTS,
-    LONGEST_FRAME,
-    PRESSURE_TYPE,
-    REFERENCE_TYPE,
-    SECOND,
-    TEMPERATURE_TYPE,
-    TICK_TYPE,
-    VELOCITY_TYPE,
-    Layout,
-)
 from seal_friction_ros.core.estimation.pipeline import (
     PipelineParameters,
     PipelineState,
@@ -44,8 +26,32 @@ from seal_friction_ros.core.estimation.pipeline import (
     receive_velocity,
     send,
 )
-from seal_friction_ros.core.estimation.records import (
+from seal_friction_ros.core.foundation.compiled import INNER, compiled, for_compiler
+from seal_friction_ros.core.messages.blocks import Bytes, Integers, Kind, Messages, UnsuitedError
+from seal_friction_ros.core.messages.compiled_coder import (
+    Outbox,
+    body_size,
+    is_message,
+    numbers_of,
+    room_for,
+    stamp_at,
+    writer,
+)
+from seal_friction_ros.core.messages.layouts import (
+    ESTIMATE_TYPE,
+    FEEDFORWARD_TYPE,
+    FORCE_TYPE,
+    LAYOUT_OF,
+    PRESSURE_TYPE,
+    REFERENCE_TYPE,
+    TEMPERATURE_TYPE,
+    TICK_TYPE,
+    VELOCITY_TYPE,
+    Layout,
+)
+from seal_friction_ros.core.messages.records import (
     NEVER,
+    FeedForward,
     Force,
     FrictionEstimate,
     Pressure,
@@ -54,14 +60,12 @@ from seal_friction_ros.core.estimation.records import (
     Velocity,
     WatchdogTick,
 )
-from seal_friction_ros.core.foundation.compiled import INNER, compiled, for_compiler
 
 LATEST = 1 << 61  # [ns] stamps up to here, as messages have them: differences fit into 64 bits
 
 _FORCE, _PRESSURE, _REFERENCE, _TEMPERATURE, _TICK, _VELOCITY = (
     int(kind) for kind in (Kind.FORCE, Kind.PRESSURE, Kind.REFERENCE, Kind.TEMPERATURE, Kind.TICK, Kind.VELOCITY)
 )
-_LAYOUTS = {layout.message_type: layout for layout in LAYOUTS}
 _INPUT_TYPES = {
     _FORCE: FORCE_TYPE,
     _PRESSURE: PRESSURE_TYPE,
@@ -70,14 +74,14 @@ _INPUT_TYPES = {
     _TICK: TICK_TYPE,
     _VELOCITY: VELOCITY_TYPE,
 }
-_NUMBERS = tuple(len(_LAYOUTS[_INPUT_TYPES[kind]].codes) if kind in _INPUT_TYPES else 0 for kind in Kind)
+_NUMBERS = tuple(len(LAYOUT_OF[_INPUT_TYPES[kind]].codes) if kind in _INPUT_TYPES else 0 for kind in Kind)
 """How many numbers an input of each kind has, all of them float64."""
 _ANSWERS: dict[type, tuple[int, Layout]] = {
-    FrictionEstimate: (0, _LAYOUTS[ESTIMATE_TYPE]),
-    FeedForward: (1, _LAYOUTS[FEEDFORWARD_TYPE]),
+    FrictionEstimate: (0, LAYOUT_OF[ESTIMATE_TYPE]),
+    FeedForward: (1, LAYOUT_OF[FEEDFORWARD_TYPE]),
 }
-"""Record of an answer -> its column in `_Outbox`, and its layout."""
-_BODY_SIZES = tuple((layout.size + 7) // 8 * 8 for _, layout in _ANSWERS.values())  # [bytes] padded to 8
+"""Record of an answer -> its column in `Outbox`, and its layout."""
+_BODY_SIZES = tuple(body_size(layout) for _, layout in _ANSWERS.values())  # [bytes]
 
 
 class Answers(NamedTuple):
@@ -88,20 +92,6 @@ class Answers(NamedTuple):
     estimate_sizes: Integers
     feedforward_offsets: Integers
     feedforward_sizes: Integers
-
-
-class _Outbox(NamedTuple):
-    """Where compiled code puts answers: three views of the same bytes, and where each answer is in them."""
-
-    small: Any
-    words: Any
-    numbers: Any
-    offsets: Any  # of the estimate and the feed-forward to each message, shape (2, n); likewise
-    sizes: Any
-    cursor: Any  # [bytes] used so far, shape (1,)
-    row: Any  # an answer as numbers, shape (16,)
-    data: Any  # the messages, whose stamps and frame names the answers take over
-    message_offsets: Any
 
 
 def receive_all(
@@ -124,7 +114,7 @@ def receive_all(
         raise UnsuitedError(f'message {wrong}')
     small = np.zeros(room, np.uint8)
     places = np.zeros((2, 2, len(messages.kinds)), np.int64)
-    outbox = _Outbox(
+    outbox = Outbox(
         small,
         small.view(np.uint32),
         small.view(np.float64),
@@ -155,71 +145,27 @@ def _fits(value: Any) -> bool:
 
 
 @compiled
-def _integer(data: Bytes, offset: int, size: int) -> int:
-    """Whole number of ``size`` bytes, little endian, without a sign if it is shorter than 8."""
-    value = np.int64(0)
-    for i in range(size):
-        value |= np.int64(data[offset + i]) << np.int64(8 * i)
-    return int(value)
-
-
-@compiled
-def _number(data: Bytes, offset: int) -> float:
-    """float64 at any byte."""
-    return float(np.int64(_integer(data, offset, 8)).view(np.float64))
-
-
-@compiled
-def _numbers(data: Bytes, offset: int, count: int) -> tuple[float, float, float]:
-    """The first ``count`` numbers of a message, 1 to 3, then zeros."""
-    first = _number(data, offset)
-    second = _number(data, offset + 8) if count > 1 else 0.0
-    third = _number(data, offset + 16) if count > 2 else 0.0
-    return first, second, third
-
-
-@compiled
-def _head_size(frame_length: int) -> int:
-    """As `messages.head_size`."""
-    return (12 + frame_length + 7) // 8 * 8
-
-
-@compiled
-def _stamp(data: Bytes, offset: int) -> int:
-    """Stamp [ns] of a message."""
-    seconds = np.int64(np.int32(np.uint32(_integer(data, offset + 4, 4))))
-    return int(seconds * SECOND + _integer(data, offset + 8, 4))
-
-
-@compiled
 def _check(
     data: Bytes, kinds: Bytes, offsets: Integers, sizes: Integers, received: Integers, sent: Integers
 ) -> tuple[int, int]:
-    """Check inputs as `messages.decode` does.
+    """Check inputs as `coder.decode` does.
 
     Returns:
         The first message that is not of its kind, or -1; and the room [bytes] that all answers may need.
     """
     room = 0
     for i in range(len(kinds)):
-        kind, offset, size = kinds[i], offsets[i], sizes[i]
+        kind, offset = kinds[i], offsets[i]
         if not _FORCE <= kind <= _VELOCITY:
             continue
         if not (0 <= received[i] <= LATEST and 0 <= sent[i] <= LATEST):
             return i, 0
-        if size < 16 or data[offset] != 0 or data[offset + 1] != 1:
+        if not is_message(data, offset, sizes[i], _NUMBERS[kind]):
             return i, 0
-        nanoseconds, length = _integer(data, offset + 8, 4), _integer(data, offset + 12, 4)
-        if length > LONGEST_FRAME or nanoseconds >= SECOND:
-            return i, 0
-        whole = 4 + _head_size(length) + 8 * _NUMBERS[kind]
-        if not whole <= size <= whole + 3:
-            return i, 0
-        head = _head_size(max(length, 1))  # an empty name is answered by one of one byte, its end
         if kind == _VELOCITY:
-            room += 8 + head + _BODY_SIZES[0]
+            room += room_for(data, offset, _BODY_SIZES[0])
         if kind >= _TICK:
-            room += 8 + head + _BODY_SIZES[1]
+            room += room_for(data, offset, _BODY_SIZES[1])
     return -1, room
 
 
@@ -235,9 +181,8 @@ def _receive_all(
             continue
         offset, received = message_offsets[i], receipts[i]
         since = acting_since(parameters.feedforward, received, sent[i])
-        body = offset + 4 + _head_size(_integer(data, offset + 12, 4))
-        stamp = _stamp(data, offset)
-        first, second, third = _numbers(data, body, _NUMBERS[kind])
+        stamp = stamp_at(data, offset)
+        first, second, third = numbers_of(data, offset, _NUMBERS[kind])
         if kind == _VELOCITY:
             state = receive_velocity(parameters, state, Velocity(stamp, first, i), received, since, outbox)
         elif kind == _PRESSURE:
@@ -260,10 +205,10 @@ def _receive_all(
 def _send(emit: Any, record: Any, frame_id: Any) -> Any:
     """`pipeline.send` in compiled code: the record goes into the outbox. The frame is the number of the message."""
     del frame_id  # overload compares the names with those of `send`
-    if getattr(emit, 'instance_class', None) is not _Outbox:
+    if getattr(emit, 'instance_class', None) is not Outbox:
         return None
     column, layout = _ANSWERS[record.instance_class]
-    write = _writer(layout)
+    write = writer(layout)
 
     def implementation(emit: Any, record: Any, frame_id: Any) -> None:
         """What compiled code runs."""
@@ -274,52 +219,3 @@ def _send(emit: Any, record: Any, frame_id: Any) -> Any:
         write(emit, column, frame_id)
 
     return implementation
-
-
-@cache
-def _writer(layout: Layout) -> Any:
-    """Function that writes the answer in ``outbox.row`` by its layout.
-
-    It takes the outbox apart at once: each access to an array of a record counts references, which costs more than the
-    writing. Likewise all is one function, with a loop for each size of numbers.
-    """
-    places = list(zip(layout.offsets, map(struct.calcsize, layout.codes), strict=True))
-    eights, fours, ones = (
-        np.array([(k, at) for k, (at, size) in enumerate(places, start=1) if size == wanted], np.int64).reshape(-1, 2)
-        for wanted in (8, 4, 1)
-    )  # which number of the row, and where it goes [bytes]; an empty array compiles, an empty tuple does not
-    size, padded = layout.size, (layout.size + 7) // 8 * 8
-
-    @compiled
-    def write(outbox: Any, column: int, number: int) -> None:
-        """Write the answer to message ``number``.
-
-        Stamp and frame name are those of the message; the name ends in a zero byte, whatever its last byte was. The
-        numbers that follow are aligned to 8 bytes.
-        """
-        small, words, numbers, answer_offsets, answer_sizes, cursor, row, data, message_offsets = outbox
-        slot, offset = cursor[0], message_offsets[number]
-        small[slot + 5] = 1  # encapsulation
-        for k in range(8):
-            small[slot + 8 + k] = data[offset + 4 + k]
-        length = max(_integer(data, offset + 12, 4), 1)
-        small[slot + 16] = length & 0xFF
-        small[slot + 17] = length >> 8
-        for k in range(length - 1):
-            small[slot + 20 + k] = data[offset + 16 + k]
-        head = _head_size(length)
-        answer_offsets[column, number] = slot + 4
-        answer_sizes[column, number] = 4 + head + size
-        body = slot + 8 + head
-        finite = True
-        for i in range(len(eights)):
-            value = row[eights[i, 0]]
-            finite = finite and np.isfinite(value)
-            numbers[(body + eights[i, 1]) // 8] = value
-        for i in range(len(fours)):
-            words[(body + fours[i, 1]) // 4] = np.uint32(row[fours[i, 0]])
-        for i in range(len(ones)):
-            small[body + ones[i, 1]] = np.uint8(np.int64(row[ones[i, 0]]))
-        cursor[0] = body + padded if finite else -1
-
-    return write

@@ -32,18 +32,7 @@ from seal_friction_ros.core.estimation.conditioned_velocity import (
     condition_velocity,
 )
 from seal_friction_ros.core.estimation.hidden_motion import NO_HIDDEN_MOTION, Apparent, HiddenMotion, with_sample
-from seal_friction_ros.core.estimation.records import (
-    EXTRAPOLATED,
-    NEVER,
-    NO_FORCE,
-    NO_PRESSURE,
-    Force,
-    FrictionEstimate,
-    Pressure,
-    RodSample,
-    SealTemperature,
-    Status,
-)
+from seal_friction_ros.core.estimation.records import RodSample, SealTemperature
 from seal_friction_ros.core.estimation.sheared_seals import (
     NOT_FOLLOWED,
     FollowedElasticity,
@@ -87,6 +76,16 @@ from seal_friction_ros.core.friction.temperature import (
     TemperatureScale,
     is_identified_at,
     one_temperature_scale,
+)
+from seal_friction_ros.core.messages.records import (
+    EXTRAPOLATED,
+    NEVER,
+    NO_FORCE,
+    NO_PRESSURE,
+    Force,
+    FrictionEstimate,
+    Pressure,
+    Status,
 )
 
 

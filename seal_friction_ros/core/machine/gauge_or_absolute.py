@@ -6,8 +6,8 @@ A chamber without load is at ambient pressure: 0 Pa gauge, about 1e5 Pa absolute
 import math
 from typing import NamedTuple
 
-from seal_friction_ros.core.estimation.records import NEVER, Pressure
 from seal_friction_ros.core.machine.machine_file import FLUID_PRESSURE, Actuator, MachineFile, Signal
+from seal_friction_ros.core.messages.records import NEVER, Pressure
 
 LOWEST_GAUGE = -5e4  # [Pa] only a chamber that cavitates is nearer to vacuum
 LOWEST_ABSOLUTE = 9e4  # [Pa] a pressure that never falls below it may be absolute ...

@@ -12,11 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from seal_friction_ros.core.estimation import messages as m
 from seal_friction_ros.core.estimation.configuration import Configuration, Recorded, snapshot_text
-from seal_friction_ros.core.estimation.message_blocks import Messages
-from seal_friction_ros.core.estimation.records import Clock
-from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, decode_together
 from seal_friction_ros.core.machine.machine import (
     QUANTITIES,
     Machine,
@@ -36,7 +32,12 @@ from seal_friction_ros.core.machine.machine_snapshot import (
     parse_machine_text,
     snapshot_of,
 )
-from seal_friction_ros.core.machine.message_fields import short_name
+from seal_friction_ros.core.messages import coder, layouts, records
+from seal_friction_ros.core.messages.blocks import Messages
+from seal_friction_ros.core.messages.definitions import short_name
+from seal_friction_ros.core.messages.layouts import MACHINE_TYPE
+from seal_friction_ros.core.messages.records import Clock
+from seal_friction_ros.core.messages.together import decode_together
 from seal_friction_ros.files import machine_configurations, read_machine
 from seal_friction_ros.offline.bags.bag import (
     BagError,
@@ -51,10 +52,15 @@ from seal_friction_ros.offline.bags.topics import RECORDED, TYPES, Topics, find_
 
 MACHINE_CONFIGURATION = '/machine_estimator/configuration'
 LARGEST_CLOCK_STEP = 1_000_000_000  # [ns] stamps further from the log time are of another clock; our choice
-_LAST_PARTS = {**m.INPUTS, **m.OUTPUTS, 'watchdog_tick': m.TICK_TYPE, 'configuration': m.CONFIGURATION_TYPE}
+_LAST_PARTS = {
+    **layouts.INPUTS,
+    **layouts.OUTPUTS,
+    'watchdog_tick': layouts.TICK_TYPE,
+    'configuration': layouts.CONFIGURATION_TYPE,
+}
 _NAMES = {kind: topic for topic, kind in _LAST_PARTS.items()}
 """message type -> last part of its topic"""
-_OWN = {m.ESTIMATE_TYPE: 'estimate', m.FEEDFORWARD_TYPE: 'feedforward', m.TICK_TYPE: 'tick'}
+_OWN = {layouts.ESTIMATE_TYPE: 'estimate', layouts.FEEDFORWARD_TYPE: 'feedforward', layouts.TICK_TYPE: 'tick'}
 """message type that the node of a machine makes for each actuator -> field of `Topics`"""
 
 
@@ -135,14 +141,14 @@ def machine_messages(bag: Path, mapping: MappingFile | None, *, with_answers: bo
     machine, state = machine_in(bag, mapping)
     answers: list[tuple[str, str, bytes]] = []
 
-    def collect(name: str, record: m.Output, frame_id: bytes) -> None:
-        kind = m.type_of(record)
-        answers.append((f'/{name}/{_NAMES[kind]}', kind, m.encode(record, frame_id)))
+    def collect(name: str, record: records.Output, frame_id: bytes) -> None:
+        kind = coder.type_of(record)
+        answers.append((f'/{name}/{_NAMES[kind]}', kind, coder.encode(record, frame_id)))
 
-    text = m.encode_text(machine_text(snapshot_of(machine, state)))
+    text = coder.encode_text(machine_text(snapshot_of(machine, state)))
     for number, message in enumerate(read_messages(bag)):
         if number == 0:
-            yield BagMessage(MACHINE_CONFIGURATION, m.CONFIGURATION_TYPE, message.log_time, text)
+            yield BagMessage(MACHINE_CONFIGURATION, layouts.CONFIGURATION_TYPE, message.log_time, text)
         if message.topic in machine.plans:
             yield message._replace(publish_time=message.log_time)  # it does not tell when it was sent
             if with_answers:
@@ -151,7 +157,7 @@ def machine_messages(bag: Path, mapping: MappingFile | None, *, with_answers: bo
                     state = receive(machine, state, plan, plan.read(message.data), message.log_time, collect)
                 yield from (BagMessage(topic, kind, message.log_time, data) for topic, kind, data in answers)
                 answers.clear()
-        elif message.type_name not in (*m.DECODERS, MACHINE_TYPE):
+        elif message.type_name not in (*coder.DECODERS, MACHINE_TYPE):
             yield message
 
 
@@ -176,7 +182,7 @@ class Translation:
         """Topics of the machine."""
         return self._plans.keys()
 
-    def records(self, message: BagMessage, missing: Counter[str]) -> Iterator[tuple[int, m.Input, bytes]]:
+    def records(self, message: BagMessage, missing: Counter[str]) -> Iterator[tuple[int, records.Input, bytes]]:
         """Number of the actuator, record and frame name of what a message makes, in the order of the estimator.
 
         Args:
@@ -312,22 +318,22 @@ def is_of_machine(bag: Path, infos: Mapping[str, TopicInfo], mapping: MappingFil
     """
     present = {info.type_name for info in infos.values() if info.message_count}
     if mapping is not None:
-        return m.VELOCITY_TYPE not in present or not infos.keys().isdisjoint(mapping.file.topics)
-    if m.CONFIGURATION_TYPE not in present:
+        return layouts.VELOCITY_TYPE not in present or not infos.keys().isdisjoint(mapping.file.topics)
+    if layouts.CONFIGURATION_TYPE not in present:
         return False
     try:
         return _first_snapshot(bag).file.document is not None
     except BagError:
-        if m.VELOCITY_TYPE in present:  # a bag with a configuration that cannot be read is still worth a report
+        if layouts.VELOCITY_TYPE in present:  # a bag with a configuration that cannot be read is still worth a report
             return False
         raise
 
 
 def _first_snapshot(bag: Path) -> MachineSnapshot:
     """Snapshot in the first configuration of a bag."""
-    first = next(message for message in read_messages(bag) if message.type_name == m.CONFIGURATION_TYPE)
+    first = next(message for message in read_messages(bag) if message.type_name == layouts.CONFIGURATION_TYPE)
     with named(bag, first):
-        return parse_machine_text(m.decode_text(first.data))
+        return parse_machine_text(coder.decode_text(first.data))
 
 
 def _machine_of(bag: Path, snapshot: MachineSnapshot) -> tuple[Machine, MachineState]:
@@ -379,7 +385,7 @@ def _topics_of(actuator: MachineActuator, infos: Mapping[str, TopicInfo], *, has
         name: f'/{actuator.name}/{_NAMES[kind]}' if name in made else ''
         for name, kind in zip(TYPES._fields, TYPES, strict=True)
     }
-    clocks = [topic for topic, kind in present.items() if kind == m.CLOCK_TYPE and not has_mapping]
+    clocks = [topic for topic, kind in present.items() if kind == layouts.CLOCK_TYPE and not has_mapping]
     return Topics(**{**names, 'clock': clocks[0] if clocks else ''})
 
 
@@ -418,7 +424,7 @@ class _OfActuator:
 
     def _taken(self, message: BagMessage) -> Iterable[BagMessage]:
         kind, translation = message.type_name, self._translation
-        if kind == m.CONFIGURATION_TYPE:
+        if kind == layouts.CONFIGURATION_TYPE:
             return [self._configured(message)]
         if translation is None:
             return []
@@ -430,31 +436,31 @@ class _OfActuator:
             return self._encoded(
                 message, [(record, frame_id) for name, record, frame_id in answers if name == self._name]
             )
-        if kind == m.CLOCK_TYPE:
-            translation.follow(m.decode_clock(message.data), message.log_time)
+        if kind == layouts.CLOCK_TYPE:
+            translation.follow(coder.decode_clock(message.data), message.log_time)
             return [message]
         if kind in _OWN and _is_of(self._name, message.topic):
             return [message._replace(topic=f'/{self._name}/{message.topic.rpartition("/")[2]}')]
-        return [] if kind in m.DECODERS else [message]
+        return [] if kind in coder.DECODERS else [message]
 
     def _configured(self, message: BagMessage) -> BagMessage:
         """Take a configuration of the machine; that of the actuator."""
-        known = parse_machine_text(m.decode_text(message.data))
+        known = parse_machine_text(coder.decode_text(message.data))
         if self._name not in known.actuators:
             raise ValueError(f'no {self._name} in the configuration: {", ".join(known.actuators)}')
         self._translation = Translation(*_machine_of(self._bag, known), self._name)
         snapshot = known.actuators[self._name].snapshot
         if self._did_not_act:
             snapshot = snapshot._replace(recorded=Recorded(None))
-        return message._replace(topic=self._topics.configuration, data=m.encode_text(snapshot_text(snapshot)))
+        return message._replace(topic=self._topics.configuration, data=coder.encode_text(snapshot_text(snapshot)))
 
     def _encoded(self, message: BagMessage, made: Iterable[tuple[Any, bytes]]) -> Iterator[BagMessage]:
         """Records as messages of the actuator."""
         for record, frame_id in made:
-            kind = m.type_of(record)
-            self._has_velocity |= kind == m.VELOCITY_TYPE
+            kind = coder.type_of(record)
+            self._has_velocity |= kind == layouts.VELOCITY_TYPE
             topic = f'/{self._name}/{_NAMES[kind]}'
-            yield message._replace(topic=topic, type_name=kind, data=m.encode(record, frame_id))
+            yield message._replace(topic=topic, type_name=kind, data=coder.encode(record, frame_id))
 
 
 def lacking(missing: Mapping[str, int]) -> list[str]:

@@ -22,7 +22,8 @@ from typing import Any, NamedTuple, Self
 
 import yaml
 
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, PACKAGE
+from seal_friction_ros.core.messages.coder import DECODERS
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, PACKAGE
 from seal_friction_ros.files import parse_yaml, read_yaml, share_directory
 from seal_friction_ros.offline.bags import mcap_reader, sqlite_reader
 from seal_friction_ros.offline.bags.mcap_reader import Channel

@@ -13,8 +13,8 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 from mcap.opcode import Opcode
 
-from seal_friction_ros.core.estimation.message_blocks import MOST_MESSAGES, Bytes, Integers, Messages
 from seal_friction_ros.core.foundation.compiled import compiled
+from seal_friction_ros.core.messages.blocks import MOST_MESSAGES, Bytes, Integers, Messages
 from seal_friction_ros.offline.bags import mcap_reader
 from seal_friction_ros.offline.bags.bag import read_messages, storage
 from seal_friction_ros.offline.bags.gathered import KindOf, gathered

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from seal_friction_ros.core.machine.message_fields import Definition, full_name, parse_definition, short_name
+from seal_friction_ros.core.messages.definitions import Definition, full_name, parse_definition, short_name
 from seal_friction_ros.offline.bags.bag import BagError, bag_channels, message_definition
 from seal_friction_ros.packages import needed
 

@@ -5,7 +5,7 @@ from itertools import islice
 
 import numpy as np
 
-from seal_friction_ros.core.estimation.message_blocks import MOST_MESSAGES, Messages
+from seal_friction_ros.core.messages.blocks import MOST_MESSAGES, Messages
 from seal_friction_ros.offline.bags.bag import BagMessage
 
 KindOf = Callable[[str, str], int]

@@ -35,20 +35,20 @@ from typing import Any, NamedTuple, TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from seal_friction_ros.core.estimation.messages import (
+from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, from_mapping, parameter
+from seal_friction_ros.core.foundation.units import QUANTITIES, ZEROS, unit_size
+from seal_friction_ros.core.identification.signal_preparation import SavitzkyGolay, Sliding, slope
+from seal_friction_ros.core.messages.coder import encode
+from seal_friction_ros.core.messages.layouts import (
     FORCE_TYPE,
     POSITION_TYPE,
     PRESSURE_TYPE,
     REFERENCE_TYPE,
     TEMPERATURE_TYPE,
     VELOCITY_TYPE,
-    encode,
 )
-from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Temperature, Velocity
-from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.parameters import CheckedParameters, from_mapping, parameter
-from seal_friction_ros.core.foundation.units import QUANTITIES, ZEROS, unit_size
-from seal_friction_ros.core.identification.signal_preparation import SavitzkyGolay, Sliding, slope
+from seal_friction_ros.core.messages.records import Force, Position, Pressure, ServoReference, Temperature, Velocity
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.bags.bag import (
     FORCE_TOPIC,

@@ -4,11 +4,12 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, ESTIMATE_TYPE, decode, decode_text
-from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
 from seal_friction_ros.core.friction.states import FrictionState
-from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, decode_together
 from seal_friction_ros.core.machine.machine_snapshot import parse_machine_text
+from seal_friction_ros.core.messages.coder import decode, decode_text
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, ESTIMATE_TYPE, MACHINE_TYPE
+from seal_friction_ros.core.messages.records import FrictionEstimate, Status
+from seal_friction_ros.core.messages.together import decode_together
 from seal_friction_ros.offline.bags.actuator_bag import MappingFile, machine_messages, named
 from seal_friction_ros.offline.bags.bag import BagError, BagMessage, bag_topics
 

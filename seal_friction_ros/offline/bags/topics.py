@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from seal_friction_ros.core.estimation import messages
+from seal_friction_ros.core.messages import layouts
 from seal_friction_ros.offline.bags.bag import (
     CONFIGURATION_TOPIC,
     ESTIMATE_TOPIC,
@@ -16,7 +16,7 @@ from seal_friction_ros.offline.bags.bag import (
     bag_topics,
 )
 
-ANSWER_TOPICS = {messages.ESTIMATE_TYPE: ESTIMATE_TOPIC, messages.FEEDFORWARD_TYPE: FEEDFORWARD_TOPIC}
+ANSWER_TOPICS = {layouts.ESTIMATE_TYPE: ESTIMATE_TOPIC, layouts.FEEDFORWARD_TYPE: FEEDFORWARD_TOPIC}
 """Message type of an answer -> topic, if the bag has no topic of that type."""
 
 
@@ -48,7 +48,7 @@ class Topics(NamedTuple):
     @property
     def answers(self) -> dict[str, str]:
         """Message type of an answer -> its topic; empty if there is no such topic."""
-        return {messages.ESTIMATE_TYPE: self.estimate, messages.FEEDFORWARD_TYPE: self.feedforward}
+        return {layouts.ESTIMATE_TYPE: self.estimate, layouts.FEEDFORWARD_TYPE: self.feedforward}
 
     @property
     def state(self) -> str:
@@ -57,17 +57,17 @@ class Topics(NamedTuple):
 
 
 TYPES = Topics(
-    pressure=messages.PRESSURE_TYPE,
-    velocity=messages.VELOCITY_TYPE,
-    force=messages.FORCE_TYPE,
-    reference=messages.REFERENCE_TYPE,
-    position=messages.POSITION_TYPE,
-    estimate=messages.ESTIMATE_TYPE,
-    feedforward=messages.FEEDFORWARD_TYPE,
-    configuration=messages.CONFIGURATION_TYPE,
-    tick=messages.TICK_TYPE,
-    temperature=messages.TEMPERATURE_TYPE,
-    clock=messages.CLOCK_TYPE,
+    pressure=layouts.PRESSURE_TYPE,
+    velocity=layouts.VELOCITY_TYPE,
+    force=layouts.FORCE_TYPE,
+    reference=layouts.REFERENCE_TYPE,
+    position=layouts.POSITION_TYPE,
+    estimate=layouts.ESTIMATE_TYPE,
+    feedforward=layouts.FEEDFORWARD_TYPE,
+    configuration=layouts.CONFIGURATION_TYPE,
+    tick=layouts.TICK_TYPE,
+    temperature=layouts.TEMPERATURE_TYPE,
+    clock=layouts.CLOCK_TYPE,
 )
 """Message type of each topic."""
 

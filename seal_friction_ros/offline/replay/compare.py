@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from seal_friction_ros.core.estimation.messages import DECODERS, ESTIMATE_TYPE
+from seal_friction_ros.core.messages.coder import DECODERS
+from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE
 from seal_friction_ros.offline.bags.actuator_bag import MappingFile, is_of_machine, open_actuator
 from seal_friction_ros.offline.bags.bag import BagError, BagMessage, TopicInfo, bag_topics, read_messages
 

@@ -1,40 +1,39 @@
 """Command of a controller in a bag, and the gain from force to command (`core.tuning.output_gain`)."""
 
 import math
-import struct
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from seal_friction_ros.core.estimation import messages
-from seal_friction_ros.core.estimation.records import Position, Pressure, Velocity
+from seal_friction_ros.core.messages import coder
+from seal_friction_ros.core.messages.fields import Reader
+from seal_friction_ros.core.messages.layouts import DEFINITIONS, NUMBER_TYPE, NUMBERS_TYPE
+from seal_friction_ros.core.messages.records import Position, Pressure, Velocity
 from seal_friction_ros.core.tuning.output_gain import CommandRecord, OutputGain, output_gain
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings
 from seal_friction_ros.offline.bags.actuator_bag import MappingFile, open_actuator
 from seal_friction_ros.offline.bags.bag import BagError
 
-NUMBER, NUMBERS = 'std_msgs/msg/Float64', 'std_msgs/msg/Float64MultiArray'
-_HEADER = b'\x00\x01'  # CDR, little endian
+_FIRST = {NUMBER_TYPE: 'data', NUMBERS_TYPE: 'data[0]'}
+
+
+@cache
+def _reader(type_name: str) -> Reader:
+    return Reader(DEFINITIONS, type_name, [_FIRST[type_name]])
 
 
 def first_number(type_name: str, data: bytes) -> float:
-    """Value of a `std_msgs/Float64`, or the first value of a `std_msgs/Float64MultiArray` without a layout.
+    """Value of a `std_msgs/Float64`, or the first value of a `std_msgs/Float64MultiArray`.
 
     Raises:
-        ValueError: The message is malformed, empty, or has a layout.
+        ValueError: The message is malformed or empty.
     """
-    try:
-        if data[:2] != _HEADER:
-            raise ValueError('not little-endian CDR')
-        if type_name == NUMBER:
-            return float(struct.unpack_from('<d', data, 4)[0])
-        dimensions, _offset, length = struct.unpack_from('<III', data, 4)
-        if dimensions or not length:
-            raise ValueError('the array is empty or has a layout')
-        return float(struct.unpack_from('<d', data, 4 + 16)[0])  # aligned to 8 bytes after the header
-    except struct.error as error:
-        raise ValueError(f'malformed: {error}') from None
+    (number,) = _reader(type_name).read(data).numbers
+    if number is None:
+        raise ValueError('the array is empty')
+    return number
 
 
 def read_output_gain(
@@ -62,9 +61,9 @@ def read_output_gain(
         raise BagError(f'{topic}: give --area-a and --area-b [m2]: the gain needs the force of the pressures')
     source = open_actuator(bag, namespace, mapping)
     found = source.infos.get(topic)
-    if found is None or found.type_name not in (NUMBER, NUMBERS):
+    if found is None or found.type_name not in _FIRST:
         what = 'is not in it' if found is None else f'is {found.type_name}'
-        raise BagError(f'{bag}: the command {topic} {what}: it has to be {NUMBER} or {NUMBERS}')
+        raise BagError(f'{bag}: the command {topic} {what}: it has to be {NUMBER_TYPE} or {NUMBERS_TYPE}')
     held: dict[str, Any] = {}
     command, rows = math.nan, []
     for message in source.messages():
@@ -74,7 +73,7 @@ def read_output_gain(
             except ValueError as error:
                 raise BagError(f'{bag}: {topic}: {error}') from None
         elif message.topic in source.topics:
-            sample = messages.DECODERS[message.type_name](message.data)
+            sample = coder.DECODERS[message.type_name](message.data)
             held[type(sample).__name__] = sample
             pressure: Pressure | None = held.get('Pressure')
             position: Position | None = held.get('Position')

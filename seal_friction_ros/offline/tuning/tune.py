@@ -13,13 +13,17 @@ from typing import Any, NamedTuple
 import numpy as np
 import yaml
 
-from seal_friction_ros.core.estimation import messages
 from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING, Configuration, parse_snapshot
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.node_options import FEEDFORWARD_PREFIX
 from seal_friction_ros.core.estimation.pipeline import NO_REFERENCE, Reference, condition_reference, is_possible
-from seal_friction_ros.core.estimation.records import (
+from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.parameters import meanings
+from seal_friction_ros.core.foundation.units import MM, MS, UM
+from seal_friction_ros.core.friction.force_sum_correction import corrected_force_sum
+from seal_friction_ros.core.messages import coder, layouts
+from seal_friction_ros.core.messages.records import (
     NO_PRESSURE,
     Force,
     FrictionEstimate,
@@ -28,10 +32,6 @@ from seal_friction_ros.core.estimation.records import (
     ServoReference,
     Velocity,
 )
-from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.parameters import meanings
-from seal_friction_ros.core.foundation.units import MM, MS, UM
-from seal_friction_ros.core.friction.force_sum_correction import corrected_force_sum
 from seal_friction_ros.core.servo.closed_loop import IDEAL_SENSORS, Axis, AxisSensors
 from seal_friction_ros.core.servo.sensors import SensorSettings
 from seal_friction_ros.core.servo.simulator_options import (
@@ -347,9 +347,9 @@ def read_recording(
     """
     topics, bag = actuator.topics, actuator.path
     needed = {
-        messages.REFERENCE_TYPE: (topics.reference, 'the feed-forward is computed from the reference'),
-        messages.FORCE_TYPE: (topics.force, 'the friction is computed from the force sum'),
-        messages.PRESSURE_TYPE: (topics.pressure, 'the friction depends on the pressure'),
+        layouts.REFERENCE_TYPE: (topics.reference, 'the feed-forward is computed from the reference'),
+        layouts.FORCE_TYPE: (topics.force, 'the friction is computed from the force sum'),
+        layouts.PRESSURE_TYPE: (topics.pressure, 'the friction depends on the pressure'),
     }
     for type_name, (topic, reason) in needed.items():
         if not topic:
@@ -365,21 +365,21 @@ def read_recording(
             if count % 1000 == 0:
                 advance(1000)
             message = step.message
-            if message.type_name == messages.CONFIGURATION_TYPE:
-                configuration = parse_snapshot(messages.decode_text(message.data)).configuration
+            if message.type_name == layouts.CONFIGURATION_TYPE:
+                configuration = parse_snapshot(coder.decode_text(message.data)).configuration
                 estimator = configuration.parameters().estimator
                 continue
             if message.topic not in topics:
                 continue
-            sample = messages.DECODERS[message.type_name](message.data)
+            sample = coder.DECODERS[message.type_name](message.data)
             held[type(sample)] = sample
             conditioned = _with_reference(estimator.settings, conditioned, sample)
             reference = held.get(ServoReference)
             if not isinstance(sample, Velocity) or reference is None:
                 continue
             if not estimates or sample.stamp > estimates[-1].stamp:
-                (data,) = (one.data for one in step.answers if one.type_name == messages.ESTIMATE_TYPE)
-                estimates.append(messages.decode(messages.ESTIMATE_TYPE, data))
+                (data,) = (one.data for one in step.answers if one.type_name == layouts.ESTIMATE_TYPE)
+                estimates.append(coder.decode(layouts.ESTIMATE_TYPE, data))
                 age = (sample.stamp - reference.stamp) * 1e-9
                 given = conditioned.velocity
                 motions.append(RecordedMotion(given.velocity, conditioned.acceleration, sample.velocity, age))

@@ -14,7 +14,7 @@ import pytest
 import yaml
 from harness.three_recordings import NAMES, PRESSURES, SAMPLES, Recordings, friction, record
 
-from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, FEEDFORWARD_TYPE, VELOCITY_TYPE
+from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE, FEEDFORWARD_TYPE, VELOCITY_TYPE
 from seal_friction_ros.offline.bags.actuator_bag import open_actuator
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.monitor.actuator_view import COLUMNS

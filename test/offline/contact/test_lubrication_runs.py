@@ -13,14 +13,15 @@ import pytest
 from lubrication_findings import OUR_CHOICES, all_findings, influence
 from paths import ROOT
 
-from seal_friction_ros.core.estimation.messages import FORCE_TYPE, POSITION_TYPE, PRESSURE_TYPE, VELOCITY_TYPE, encode
-from seal_friction_ros.core.estimation.records import Force, Position, Pressure, Status, Velocity
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.lubrication.kinematics import ConstantAcceleration
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, Spool
 from seal_friction_ros.core.lubrication.measuring_chain import MeasuringChain, transducer_force
 from seal_friction_ros.core.lubrication.transient import run_transient
+from seal_friction_ros.core.messages.coder import encode
+from seal_friction_ros.core.messages.layouts import FORCE_TYPE, POSITION_TYPE, PRESSURE_TYPE, VELOCITY_TYPE
+from seal_friction_ros.core.messages.records import Force, Position, Pressure, Status, Velocity
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.bags.recorded_run import read_run

@@ -1,0 +1,113 @@
+"""Messages that hold several others: the answers of all actuators, and the newest messages of several topics.
+
+``seal_friction_msgs/MachineFriction`` has the answers of all actuators to one message. One message instead of two for
+each actuator: most of what an answer costs is the middleware's.
+
+``std_msgs/UInt8MultiArray`` has the newest message of each topic for who looks on. One message of an estimator instead
+of a second reader at each of its drivers: a driver that sends to two readers takes longer from one message to the next,
+and the estimator then wakes for each of them alone: 3 to 8 % more processor time (docs/performance.md, live view).
+Dimension i of the layout names topic and type, with the number of bytes; the data are the messages one after another,
+each as it is on the graph.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain, islice
+from typing import Any, NamedTuple
+
+from seal_friction_ros.core.messages.cdr import ENCAPSULATION
+from seal_friction_ros.core.messages.coder import unpacked
+from seal_friction_ros.core.messages.layouts import LAYOUTS, MACHINE_TYPE, NEWEST_TYPE, SECOND, struct_of
+from seal_friction_ros.core.messages.records import FeedForward, FrictionEstimate, Output
+
+_COUNTS = {layout.record: len(layout.codes) for layout in LAYOUTS if layout.record in (FrictionEstimate, FeedForward)}
+"""Record of an answer -> how many numbers it has, in the order of the message."""
+
+
+class NamedAnswer(NamedTuple):
+    """An answer of one actuator."""
+
+    actuator: str
+    record: Output
+    frame_id: bytes
+
+
+def encode_together(answers: Sequence[NamedAnswer]) -> bytes:
+    """The answers to one message, at least one, in the order in which they were made."""
+    parts = [[answer for answer in answers if type(answer.record) is record] for record in _COUNTS]
+    lengths: list[int] = [1]
+    values: list[Any] = [*divmod(next(chain(*parts)).record.stamp, SECOND), 1, b'']
+    for part in parts:
+        names = [answer.actuator.encode() for answer in part]
+        texts = [len(name) + 1 for name in names]
+        frames = [len(answer.frame_id) + 1 for answer in part]
+        lengths += (len(part), *texts, len(part), *frames)
+        values += (len(part), *chain(*zip(texts, names, strict=True)), len(part))
+        for (_, record, frame_id), length in zip(part, frames, strict=True):
+            values += (*divmod(record.stamp, SECOND), length, frame_id, *record[1:])
+    return struct_of(MACHINE_TYPE, *lengths).pack(ENCAPSULATION, *values)
+
+
+def decode_together(data: bytes) -> list[NamedAnswer]:
+    """The answers in a message, estimates first: inverse of `encode_together`.
+
+    Raises:
+        ValueError: The bytes are not such a message.
+    """
+    values = islice(unpacked(MACHINE_TYPE, data), 5, None)  # behind the header
+    answers: list[NamedAnswer] = []
+    for record, numbers in _COUNTS.items():
+        names = [_text(values) for _ in range(next(values))]
+        count = next(values)
+        if count != len(names):
+            raise ValueError(f'{count} answers of {len(names)} actuators')
+        for name in names:
+            seconds, nanoseconds, _, frame_id = islice(values, 4)
+            made = record(seconds * SECOND + nanoseconds, *islice(values, numbers))
+            answers.append(NamedAnswer(name, made, frame_id[:-1]))
+    return answers
+
+
+class TopicMessage(NamedTuple):
+    """A message as it is on the graph."""
+
+    topic: str
+    type_name: str
+    data: bytes
+
+
+def encode_newest(messages: Iterable[TopicMessage]) -> bytes:
+    """The messages as one, in the order given."""
+    messages = list(messages)
+    labels = [f'{topic} {type_name}'.encode() for topic, type_name, _ in messages]
+    together = b''.join(message.data for message in messages)
+    values: list[Any] = []
+    for label, message in zip(labels, messages, strict=True):
+        values += (len(label) + 1, label, len(message.data), 1)
+    lengths = (len(labels), *(len(label) + 1 for label in labels), len(together))
+    return struct_of(NEWEST_TYPE, *lengths).pack(ENCAPSULATION, len(labels), *values, 0, len(together), together)
+
+
+def decode_newest(data: bytes) -> list[TopicMessage]:
+    """The messages in one: inverse of `encode_newest`.
+
+    Raises:
+        ValueError: The bytes are not such a message.
+    """
+    values = iter(unpacked(NEWEST_TYPE, data)[1:])
+    labels = [(_text(values), *islice(values, 2)) for _ in range(next(values))]
+    _, total, together = values
+    told = sum(size for _, size, _ in labels)
+    if total != told:
+        raise ValueError(f'{total} bytes are no {NEWEST_TYPE} of {told} bytes')
+    found, begin = [], 0
+    for label, size, _ in labels:
+        topic, _, type_name = label.partition(' ')
+        found.append(TopicMessage(topic, type_name, together[begin : begin + size]))
+        begin += size
+    return found
+
+
+def _text(values: Iterator[Any]) -> str:
+    """The next text, which stands behind its length."""
+    _, text = islice(values, 2)
+    return str(text[:-1], 'utf-8')
