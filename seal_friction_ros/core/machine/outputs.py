@@ -20,6 +20,8 @@ from seal_friction_ros.core.messages.coder import encode_efforts, encode_number,
 from seal_friction_ros.core.messages.definitions import short_name
 from seal_friction_ros.core.messages.layouts import NUMBER_TYPE, NUMBERS_TYPE
 
+_NUMBER, _NUMBERS = short_name(NUMBER_TYPE), short_name(NUMBERS_TYPE)
+
 
 class Command(NamedTuple):
     """A message for a controller."""
@@ -90,9 +92,9 @@ def check_outputs(file: MachineFile) -> None:
 
 def _encoded(parts: list[tuple[Output, float]], stamp: int) -> bytes:
     kind = parts[0][0].type_name
-    if kind == short_name(NUMBER_TYPE):
+    if kind == _NUMBER:
         return encode_number(parts[0][1])
-    if kind == short_name(NUMBERS_TYPE):
+    if kind == _NUMBERS:
         values = [0.0] * (1 + max(output.index for output, _ in parts))
         for output, command in parts:
             values[output.index] = command

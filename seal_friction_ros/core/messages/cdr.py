@@ -25,12 +25,12 @@ class Place(NamedTuple):
     """Where a number, a list of numbers or a text stands."""
 
     offset: int  # of the first byte
-    code: str  # of one of them, as of `struct`; 's': a text
+    code: str  # of one of them, as of `struct`; 's': a text, or a list of bytes
     amount: int = 1  # of the numbers, or of the bytes of a text with its end
 
     def element(self, number: int) -> 'Place':
         """One number of a list."""
-        return Place(self.offset + number * _SIZES[self.code], self.code)
+        return Place(self.offset + number * _SIZES[self.code], 'B' if self.code == 's' else self.code)
 
 
 class Walk:
@@ -46,8 +46,8 @@ class Walk:
         self._definition, self._length_at, self._end = definition, length_at, end
         self.offset = ORIGIN
         self.slack = 3  # [bytes] that may follow: some writers pad to a multiple of 4, rclpy to the size it estimated
-        self.lengths: list[int] = []  # offset of each length, which the places behind it depend on
-        self.places: list[tuple[int, str]] = [(0, f'{ORIGIN}s')]  # offset and format of all, lengths included, in order
+        self.lengths: list[Place] = []  # which the places behind them depend on
+        self.places = [Place(0, 's', ORIGIN)]  # of all, lengths included, in order
 
     def message(self, kind: str) -> dict[str, Any]:
         """Places of the fields of a message, by their names."""
@@ -60,7 +60,7 @@ class Walk:
         code = PRIMITIVES.get(field.kind)
         if code is not None:
             self.slack += 0 if count else 7
-            return self._place(code, count, f'{count}{"s" if code == "B" else code}')
+            return self._place('s' if code == 'B' else code, count)
         if count > self._end - self.offset:  # each one has a byte or more
             raise ValueError(f'{field.name} of {count} elements in {self._end} bytes')
         self.slack += 7 * count if '/' in field.kind else 0
@@ -69,22 +69,22 @@ class Walk:
     def _one(self, kind: str) -> Any:
         if kind == STRING:
             length = self._length()
-            return self._place('s', length, f'{length}s')
+            return self._place('s', length)
         code = PRIMITIVES.get(kind)
-        return self.message(kind) if code is None else self._place(code, 1, code)
+        return self.message(kind) if code is None else self._place(code)
 
     def _length(self) -> int:
-        at = self._place('I', 1, 'I').offset
-        self.lengths.append(at)
-        return self._length_at(at)
+        place = self._place('I')
+        self.lengths.append(place)
+        return self._length_at(place.offset)
 
-    def _place(self, code: str, count: int, text: str) -> Place:
+    def _place(self, code: str, count: int = 1) -> Place:
         """The next ``count`` of a kind; ValueError if the message ends before."""
         size = _SIZES[code]
         if count:
             self.offset += -(self.offset - ORIGIN) % size
         place = Place(self.offset, code, count)
-        self.places.append((self.offset, text))
+        self.places.append(place)
         self.offset += count * size
         if self.offset > self._end:
             raise ValueError(f'{self._end} bytes are too few for the message')
@@ -106,18 +106,18 @@ def walked(definition: Definition, type_name: str, data: bytes) -> tuple[Walk, d
     return walk, root
 
 
-def laid_out(definition: Definition, type_name: str, lengths: Sequence[int]) -> list[tuple[int, str]]:
-    """Offset and format of all that a message has whose texts (with their ends) and lists have these lengths."""
+def laid_out(definition: Definition, type_name: str, lengths: Sequence[int]) -> list[Place]:
+    """Places of all that a message has whose texts (with their ends) and lists have these lengths."""
     following = iter(lengths)
     walk = Walk(definition, lambda _: next(following), 1 << 62)
     walk.message(short_name(type_name))
     return walk.places
 
 
-def struct_at(places: Sequence[tuple[int, str]]) -> struct.Struct:
-    """Format of numbers and texts at these offsets, which increase."""
+def struct_at(places: Sequence[Place]) -> struct.Struct:
+    """Format of numbers and texts at these places, whose offsets increase."""
     text, end = '<', 0
-    for offset, code in places:
-        text += f'{offset - end}x{code}' if offset > end else code
-        end = offset + struct.calcsize(f'<{code}')
+    for offset, code, amount in places:
+        text += f'{offset - end}x{amount}{code}'
+        end = offset + amount * _SIZES[code]
     return struct.Struct(text)

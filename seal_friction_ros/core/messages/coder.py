@@ -26,8 +26,9 @@ from seal_friction_ros.core.messages.layouts import (
 )
 from seal_friction_ros.core.messages.records import Clock
 
-_CLOCK = struct_of(CLOCK_TYPE)
+_CLOCK, _NUMBER = struct_of(CLOCK_TYPE), struct_of(NUMBER_TYPE)
 _FRAME_LENGTH = slice(LENGTH_AT, FRAME_AT)
+_MOST_KEPT = 64  # sizes of messages; our choice
 
 
 def _encoder(layout: Layout) -> Callable[[int, bytes, tuple[Any, ...]], bytes]:
@@ -109,13 +110,24 @@ def encode(record: Any, frame_id: bytes = b'') -> bytes:
     return encode_numbers(record[0], frame_id, record[1:])
 
 
+_kept: dict[tuple[str, int], tuple[struct.Struct, tuple[Any, ...], struct.Struct]] = {}
+"""Type and size of a message -> its encapsulation and lengths, and what a message with the same ones is read by."""
+
+
 def unpacked(type_name: str, data: bytes) -> tuple[Any, ...]:
     """Encapsulation, numbers, lengths and texts (with their ends) of a message of this project, in their order.
 
     Raises:
         ValueError: The bytes are not a message of this type.
     """
-    return struct_at(walked(DEFINITIONS, type_name, data)[0].places).unpack_from(data)
+    found = _kept.get((type_name, len(data)))
+    if found is None or found[0].unpack_from(data) != found[1]:
+        walk, _ = walked(DEFINITIONS, type_name, data)
+        lengths = struct_at([walk.places[0], *walk.lengths])
+        if len(_kept) >= _MOST_KEPT:
+            _kept.clear()
+        found = _kept[type_name, len(data)] = lengths, lengths.unpack_from(data), struct_at(walk.places)
+    return found[2].unpack_from(data)
 
 
 def encode_text(text: str) -> bytes:
@@ -172,7 +184,7 @@ def decode(message_type: str, data: bytes) -> Any:
 
 def encode_number(value: float) -> bytes:
     """A ``std_msgs/Float64``."""
-    return struct_of(NUMBER_TYPE).pack(ENCAPSULATION, value)
+    return _NUMBER.pack(ENCAPSULATION, value)
 
 
 def encode_numbers(values: Sequence[float]) -> bytes:

@@ -20,7 +20,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.foundation.parameters import printable
-from seal_friction_ros.core.messages.cdr import Place, Walk, struct_at, walked
+from seal_friction_ros.core.messages.cdr import LITTLE_ENDIAN, Place, Walk, struct_at, walked
 from seal_friction_ros.core.messages.definitions import STRING, Definition, Field, short_name
 from seal_friction_ros.core.messages.layouts import LONGEST_FRAME, SECOND
 
@@ -191,22 +191,21 @@ class Reader:
     def _layout(self, walk: Walk, root: Mapping[str, Any], data: bytes) -> _Layout:
         found = [_Found(data, root, path) for path in self._paths]
         texts = {text for one in found for text in one.used}
-        guards = sorted([(0, '2s'), *((at, 'I') for at in walk.lengths), *(_format(text) for text in texts)])
-        guard = struct_at(guards)
+        guard = struct_at(sorted([Place(0, 's', len(LITTLE_ENDIAN)), *walk.lengths, *texts]))
         head = None
         if self._has_header:
             stamp, frame = root['header']['stamp'], root['header']['frame_id']
             if frame.amount > LONGEST_FRAME:
                 raise ValueError(f'a frame name of {frame.amount} bytes is not valid')
             name = frame._replace(amount=max(frame.amount - 1, 0))
-            head = struct_at([_format(place) for place in (stamp['sec'], stamp['nanosec'], name)])
+            head = struct_at([stamp['sec'], stamp['nanosec'], name])
         places = sorted({one.place for one in found if one.place is not None})
         order = tuple(places.index(one.place) if one.place is not None else -1 for one in found)
         return _Layout(
             guard,
             guard.unpack_from(data),
             head,
-            struct_at([_format(place) for place in places]),
+            struct_at(places),
             order,
             order == tuple(range(len(places))),
             tuple(one.missing for one in found if one.missing),
@@ -222,11 +221,6 @@ def names_in(definition: Definition, type_name: str, data: bytes) -> list[str]:
     _, root = walked(definition, type_name, data)
     texts: list[Any] = next((root[name] for name in NAME_LISTS if isinstance(root.get(name), list)), [])
     return [_text(data, text) for text in texts if isinstance(text, Place)]
-
-
-def _format(place: Place) -> tuple[int, str]:
-    """Offset and format of a number or of a text."""
-    return place.offset, f'{place.amount}s' if place.code == 's' else place.code
 
 
 def _text(data: bytes, place: Place) -> str:

@@ -7,7 +7,7 @@ Message layouts: ``msg_defs/msg``.
 """
 
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -90,7 +90,7 @@ class Layout(NamedTuple):
     def offsets(self) -> tuple[int, ...]:
         """Distance of each number from the first one [bytes]."""
         places = laid_out(DEFINITIONS, self.message_type, (1,))[-len(self.codes) :]
-        return tuple(offset - places[0][0] for offset, _ in places)
+        return tuple(place.offset - places[0].offset for place in places)
 
     @property
     def size(self) -> int:
@@ -150,7 +150,7 @@ DEFINITIONS: Definition = {
 HEAD = len(laid_out(DEFINITIONS, 'std_msgs/Header', (1,)))
 """Number of what a stamped message begins with: encapsulation, seconds, nanoseconds, length of the frame name, name."""
 _, SECONDS_AT, NANOSECONDS_AT, LENGTH_AT, FRAME_AT = (
-    offset for offset, _ in laid_out(DEFINITIONS, 'std_msgs/Header', (1,))
+    place.offset for place in laid_out(DEFINITIONS, 'std_msgs/Header', (1,))
 )  # [bytes]
 
 
@@ -169,7 +169,7 @@ def struct_of(type_name: str, *lengths: int, numbers: int | None = None) -> stru
         lengths: Of its texts (with their ends) and lists, in their order.
         numbers: How many numbers follow the frame name; None: all.
     """
-    places: Sequence[tuple[int, str]] = laid_out(DEFINITIONS, type_name, lengths)
+    places = laid_out(DEFINITIONS, type_name, lengths)
     return struct_at(places if numbers is None else places[: HEAD + numbers])
 
 

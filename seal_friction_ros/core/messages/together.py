@@ -10,7 +10,9 @@ Dimension i of the layout names topic and type, with the number of bytes; the da
 each as it is on the graph.
 """
 
+import struct
 from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache
 from itertools import chain, islice
 from typing import Any, NamedTuple
 
@@ -33,18 +35,33 @@ class NamedAnswer(NamedTuple):
 
 def encode_together(answers: Sequence[NamedAnswer]) -> bytes:
     """The answers to one message, at least one, in the order in which they were made."""
-    parts = [[answer for answer in answers if type(answer.record) is record] for record in _COUNTS]
-    lengths: list[int] = [1]
-    values: list[Any] = [*divmod(next(chain(*parts)).record.stamp, SECOND), 1, b'']
+    parts: dict[type, list[tuple[str, int]]] = {record: [] for record in _COUNTS}
+    values: dict[type, list[Any]] = {record: [] for record in _COUNTS}
+    for actuator, record, frame_id in answers:
+        kind, length = type(record), len(frame_id) + 1
+        seconds, nanoseconds = divmod(record.stamp, SECOND)
+        parts[kind].append((actuator, length))
+        values[kind] += (seconds, nanoseconds, length, frame_id, *record[1:])
+    layout, (estimated, fed_forward) = _together(*map(tuple, parts.values()))
+    estimates, feedforwards = values.values()
+    stamp = (estimates or feedforwards)[:2]
+    return layout.pack(ENCAPSULATION, *stamp, 1, b'', *estimated, *estimates, *fed_forward, *feedforwards)
+
+
+@lru_cache(maxsize=256)
+def _together(*parts: tuple[tuple[str, int], ...]) -> tuple[struct.Struct, list[list[Any]]]:
+    """Format of a message, and what stands before the answers of each kind: counts and names.
+
+    Args:
+        parts: Of each kind: name of each actuator, and length of its frame name with its end.
+    """
+    lengths, heads = [1], []
     for part in parts:
-        names = [answer.actuator.encode() for answer in part]
+        names = [name.encode() for name, _ in part]
         texts = [len(name) + 1 for name in names]
-        frames = [len(answer.frame_id) + 1 for answer in part]
-        lengths += (len(part), *texts, len(part), *frames)
-        values += (len(part), *chain(*zip(texts, names, strict=True)), len(part))
-        for (_, record, frame_id), length in zip(part, frames, strict=True):
-            values += (*divmod(record.stamp, SECOND), length, frame_id, *record[1:])
-    return struct_of(MACHINE_TYPE, *lengths).pack(ENCAPSULATION, *values)
+        lengths += (len(part), *texts, len(part), *(length for _, length in part))
+        heads.append([len(part), *chain(*zip(texts, names, strict=True)), len(part)])
+    return struct_of(MACHINE_TYPE, *lengths), heads
 
 
 def decode_together(data: bytes) -> list[NamedAnswer]:
