@@ -5,12 +5,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from seal_friction_ros.core.estimation.configuration import (
-    Configuration,
-    first_snapshot,
-    parse_snapshot,
-    snapshot_text,
-)
+from seal_friction_ros.core.estimation.configuration import Configuration, first_snapshot, parse_snapshot, snapshot_text
 from seal_friction_ros.core.messages.coder import decode_text, encode, encode_text, type_of
 from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, INPUTS
 from seal_friction_ros.core.messages.records import Force, Position, Pressure, ServoReference, Velocity

@@ -9,18 +9,10 @@ import numpy.typing as npt
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages import layouts
 from seal_friction_ros.core.messages.cdr import LITTLE_ENDIAN
 from seal_friction_ros.core.messages.coder import decode
-from seal_friction_ros.core.messages.layouts import (
-    FRAME_AT,
-    LAYOUT_OF,
-    LENGTH_AT,
-    LONGEST_FRAME,
-    NANOSECONDS_AT,
-    SECOND,
-    SECONDS_AT,
-    numbers_at,
-)
+from seal_friction_ros.core.messages.layouts import FRAME_AT, LAYOUT_OF, LENGTH_AT, LONGEST_FRAME, SECOND
 
 Bytes = npt.NDArray[np.uint8]
 Integers = npt.NDArray[np.int64]
@@ -105,9 +97,9 @@ def numbers_of(messages: Messages, kind: int, type_name: str, topic: str = '') -
     head = data[np.where(is_usual, offsets, 0)[:, np.newaxis] + np.arange(FRAME_AT)]
     seconds, nanoseconds, length = (
         head[:, at : at + 4].view(code)[:, 0].astype(np.int64)
-        for at, code in ((SECONDS_AT, '<i4'), (NANOSECONDS_AT, '<u4'), (LENGTH_AT, '<u4'))
+        for at, code in ((layouts.SECONDS_AT, '<i4'), (layouts.NANOSECONDS_AT, '<u4'), (LENGTH_AT, '<u4'))
     )
-    begin = numbers_at(length)
+    begin = layouts.numbers_at(length)
     spare = sizes - begin - layout.size
     is_usual &= (head[:, 0] == LITTLE_ENDIAN[0]) & (head[:, 1] == LITTLE_ENDIAN[1])
     is_usual &= (nanoseconds < SECOND) & (length <= LONGEST_FRAME) & (spare >= 0) & (spare <= 3)

@@ -8,27 +8,13 @@ import struct
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from seal_friction_ros.core.messages.cdr import ENCAPSULATION, LITTLE_ENDIAN, struct_at, walked
-from seal_friction_ros.core.messages.layouts import (
-    CLOCK_TYPE,
-    CONFIGURATION_TYPE,
-    DEFINITIONS,
-    FRAME_AT,
-    JOINTS_TYPE,
-    LAYOUTS,
-    LENGTH_AT,
-    LONGEST_FRAME,
-    NUMBER_TYPE,
-    NUMBERS_TYPE,
-    SECOND,
-    Layout,
-    struct_of,
-)
+from seal_friction_ros.core.messages import layouts
+from seal_friction_ros.core.messages.cdr import ENCAPSULATION, LITTLE_ENDIAN, walked
+from seal_friction_ros.core.messages.layouts import FRAME_AT, LENGTH_AT, LONGEST_FRAME, SECOND, Layout, struct_of
 from seal_friction_ros.core.messages.records import Clock
 
-_CLOCK, _NUMBER = struct_of(CLOCK_TYPE), struct_of(NUMBER_TYPE)
+_CLOCK, _NUMBER = struct_of(layouts.CLOCK_TYPE), struct_of(layouts.NUMBER_TYPE)
 _FRAME_LENGTH = slice(LENGTH_AT, FRAME_AT)
-_MOST_KEPT = 64  # sizes of messages; our choice
 
 
 def _encoder(layout: Layout) -> Callable[[int, bytes, tuple[Any, ...]], bytes]:
@@ -93,8 +79,8 @@ def _struct_of_bytes(layout: Layout, data: bytes) -> struct.Struct:
     return known
 
 
-_ENCODERS = {layout.record: (_encoder(layout), layout.keeps_frame) for layout in LAYOUTS}
-_TYPES = {layout.record: layout.message_type for layout in LAYOUTS}
+_ENCODERS = {layout.record: (_encoder(layout), layout.keeps_frame) for layout in layouts.LAYOUTS}
+_TYPES = {layout.record: layout.message_type for layout in layouts.LAYOUTS}
 
 
 def type_of(record: Any) -> str:
@@ -110,30 +96,10 @@ def encode(record: Any, frame_id: bytes = b'') -> bytes:
     return encode_numbers(record[0], frame_id, record[1:])
 
 
-_kept: dict[tuple[str, int], tuple[struct.Struct, tuple[Any, ...], struct.Struct]] = {}
-"""Type and size of a message -> its encapsulation and lengths, and what a message with the same ones is read by."""
-
-
-def unpacked(type_name: str, data: bytes) -> tuple[Any, ...]:
-    """Encapsulation, numbers, lengths and texts (with their ends) of a message of this project, in their order.
-
-    Raises:
-        ValueError: The bytes are not a message of this type.
-    """
-    found = _kept.get((type_name, len(data)))
-    if found is None or found[0].unpack_from(data) != found[1]:
-        walk, _ = walked(DEFINITIONS, type_name, data)
-        lengths = struct_at([walk.places[0], *walk.lengths])
-        if len(_kept) >= _MOST_KEPT:
-            _kept.clear()
-        found = _kept[type_name, len(data)] = lengths, lengths.unpack_from(data), struct_at(walk.places)
-    return found[2].unpack_from(data)
-
-
 def encode_text(text: str) -> bytes:
     """EstimatorConfiguration (one text) as bytes."""
     data = text.encode()
-    return struct_of(CONFIGURATION_TYPE, len(data) + 1).pack(ENCAPSULATION, len(data) + 1, data)
+    return struct_of(layouts.CONFIGURATION_TYPE, len(data) + 1).pack(ENCAPSULATION, len(data) + 1, data)
 
 
 def decode_text(data: bytes) -> str:
@@ -142,10 +108,11 @@ def decode_text(data: bytes) -> str:
     Raises:
         ValueError: The bytes are not such a message.
     """
-    _, length, text = unpacked(CONFIGURATION_TYPE, data)
+    _, root = walked(layouts.DEFINITIONS, layouts.CONFIGURATION_TYPE, data)
+    begin, _, length = root['json']
     if not length:
         raise ValueError(f'a text without its end in a message of {len(data)} bytes')
-    return str(text[:-1], 'utf-8')
+    return str(data[begin : begin + length - 1], 'utf-8')
 
 
 def decode_clock(data: bytes) -> Clock:
@@ -163,9 +130,9 @@ def decode_clock(data: bytes) -> Clock:
 
 
 DECODERS: dict[str, Callable[[bytes], Any]] = {
-    **{layout.message_type: _decoder(layout) for layout in LAYOUTS},
-    CONFIGURATION_TYPE: decode_text,
-    CLOCK_TYPE: decode_clock,
+    **{layout.message_type: _decoder(layout) for layout in layouts.LAYOUTS},
+    layouts.CONFIGURATION_TYPE: decode_text,
+    layouts.CLOCK_TYPE: decode_clock,
 }
 """Message type -> its decoder: bytes to record. Raises ValueError for bytes that are not such a message."""
 
@@ -189,7 +156,7 @@ def encode_number(value: float) -> bytes:
 
 def encode_numbers(values: Sequence[float]) -> bytes:
     """A ``std_msgs/Float64MultiArray`` without dimensions."""
-    return struct_of(NUMBERS_TYPE, 0, len(values)).pack(ENCAPSULATION, 0, 0, len(values), *values)
+    return struct_of(layouts.NUMBERS_TYPE, 0, len(values)).pack(ENCAPSULATION, 0, 0, len(values), *values)
 
 
 def encode_efforts(stamp: int, efforts: Sequence[tuple[str, float]]) -> bytes:
@@ -197,6 +164,6 @@ def encode_efforts(stamp: int, efforts: Sequence[tuple[str, float]]) -> bytes:
     names = [name.encode() for name, _ in efforts]
     lengths, count = [len(name) + 1 for name in names], len(names)
     texts = (part for pair in zip(lengths, names, strict=True) for part in pair)
-    layout = struct_of(JOINTS_TYPE, 1, count, *lengths, 0, 0, count)
+    layout = struct_of(layouts.JOINTS_TYPE, 1, count, *lengths, 0, 0, count)
     head = (*divmod(stamp, SECOND), 1, b'')
     return layout.pack(ENCAPSULATION, *head, count, *texts, 0, 0, count, *(effort for _, effort in efforts))

@@ -7,18 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.compiled import compiled
+from seal_friction_ros.core.messages import layouts
 from seal_friction_ros.core.messages.blocks import Bytes
 from seal_friction_ros.core.messages.cdr import LITTLE_ENDIAN, ORIGIN
-from seal_friction_ros.core.messages.layouts import (
-    FRAME_AT,
-    LENGTH_AT,
-    LONGEST_FRAME,
-    NANOSECONDS_AT,
-    SECOND,
-    SECONDS_AT,
-    Layout,
-    numbers_at,
-)
+from seal_friction_ros.core.messages.layouts import FRAME_AT, LENGTH_AT, LONGEST_FRAME, Layout, numbers_at
 
 _FIRST, _SECOND = LITTLE_ENDIAN
 _SLOT = 8 - ORIGIN  # [bytes] before a message in an `Outbox`, so that its numbers stand at multiples of 8
@@ -39,7 +31,7 @@ class Outbox(NamedTuple):
 
 
 @compiled
-def _integer(data: Bytes, offset: int, size: int) -> int:
+def integer_at(data: Bytes, offset: int, size: int) -> int:
     """Whole number of ``size`` bytes, little endian, without a sign if it is shorter than 8."""
     value = np.int64(0)
     for i in range(size):
@@ -50,7 +42,7 @@ def _integer(data: Bytes, offset: int, size: int) -> int:
 @compiled
 def _number(data: Bytes, offset: int) -> float:
     """float64 at any byte."""
-    return float(np.int64(_integer(data, offset, 8)).view(np.float64))
+    return float(np.int64(integer_at(data, offset, 8)).view(np.float64))
 
 
 @compiled
@@ -58,8 +50,8 @@ def is_message(data: Bytes, offset: int, size: int, count: int) -> bool:
     """Whether ``size`` bytes at an offset are a stamped message with ``count`` float64, as `coder.decode` takes it."""
     if size < FRAME_AT or data[offset] != _FIRST or data[offset + 1] != _SECOND:
         return False
-    length = _integer(data, offset + LENGTH_AT, 4)
-    if length > LONGEST_FRAME or _integer(data, offset + NANOSECONDS_AT, 4) >= SECOND:
+    length = integer_at(data, offset + LENGTH_AT, 4)
+    if length > LONGEST_FRAME or integer_at(data, offset + layouts.NANOSECONDS_AT, 4) >= layouts.SECOND:
         return False
     whole = numbers_at(length) + 8 * count
     return bool(whole <= size <= whole + 3)
@@ -68,14 +60,14 @@ def is_message(data: Bytes, offset: int, size: int, count: int) -> bool:
 @compiled
 def stamp_at(data: Bytes, offset: int) -> int:
     """Stamp [ns] of the message at an offset."""
-    seconds = np.int64(np.int32(np.uint32(_integer(data, offset + SECONDS_AT, 4))))
-    return int(seconds * SECOND + _integer(data, offset + NANOSECONDS_AT, 4))
+    seconds = np.int64(np.int32(np.uint32(integer_at(data, offset + layouts.SECONDS_AT, 4))))
+    return int(seconds * layouts.SECOND + integer_at(data, offset + layouts.NANOSECONDS_AT, 4))
 
 
 @compiled
 def numbers_of(data: Bytes, offset: int, count: int) -> tuple[float, float, float]:
     """The first ``count`` numbers of the message at an offset, 1 to 3, all float64; then zeros."""
-    place = offset + numbers_at(_integer(data, offset + LENGTH_AT, 4))
+    place = offset + numbers_at(integer_at(data, offset + LENGTH_AT, 4))
     first = _number(data, place)
     second = _number(data, place + 8) if count > 1 else 0.0
     third = _number(data, place + 16) if count > 2 else 0.0
@@ -90,7 +82,7 @@ def body_size(layout: Layout) -> int:
 @compiled
 def room_for(data: Bytes, offset: int, body: int) -> int:
     """Room [bytes] in an `Outbox` for an answer with ``body`` bytes of numbers to the message at an offset."""
-    length = max(_integer(data, offset + LENGTH_AT, 4), 1)  # an empty name gets its end
+    length = max(integer_at(data, offset + LENGTH_AT, 4), 1)  # an empty name gets its end
     return int(_SLOT + numbers_at(length) + body)
 
 
@@ -117,9 +109,9 @@ def writer(layout: Layout) -> Any:
         small, words, numbers, answer_offsets, answer_sizes, cursor, row, data, message_offsets = outbox
         slot, offset = cursor[0] + _SLOT, message_offsets[number]
         small[slot], small[slot + 1] = _FIRST, _SECOND
-        for k in range(SECONDS_AT, LENGTH_AT):
+        for k in range(layouts.SECONDS_AT, LENGTH_AT):
             small[slot + k] = data[offset + k]
-        length = max(_integer(data, offset + LENGTH_AT, 4), 1)
+        length = max(integer_at(data, offset + LENGTH_AT, 4), 1)
         small[slot + LENGTH_AT] = length & 0xFF
         small[slot + LENGTH_AT + 1] = length >> 8
         for k in range(FRAME_AT, FRAME_AT + length - 1):

@@ -141,16 +141,16 @@ class Reader:
     Args:
         definition: Of the type.
         type_name: The type.
-        paths: Of the numbers.
+        paths: Of the numbers. None: encapsulation, numbers, lengths and texts (with their ends), in their order.
 
     Raises:
         ValueError: A path names no number of the message; lists what the message has.
     """
 
-    def __init__(self, definition: Definition, type_name: str, paths: Sequence[str]) -> None:
+    def __init__(self, definition: Definition, type_name: str, paths: Sequence[str] | None = None) -> None:
         self.type_name = short_name(type_name)
-        self._definition = definition
-        self._paths = tuple(_resolved(definition, type_name, path) for path in paths)
+        self._definition, self._reads_all = definition, paths is None
+        self._paths = tuple(_resolved(definition, type_name, path) for path in paths or ())
         fields = {field.name: field.kind for field in definition[self.type_name] if not field.form}
         self._has_header = fields.get('header') == 'std_msgs/Header'
         self._layouts: dict[int, _Layout] = {}
@@ -181,7 +181,7 @@ class Reader:
 
     def _walked(self, data: bytes) -> _Layout:
         try:
-            if len(data) > LARGEST_MESSAGE:
+            if len(data) > LARGEST_MESSAGE and not self._reads_all:
                 raise ValueError(f'{len(data)} bytes, more than {LARGEST_MESSAGE}')
             walk, root = walked(self._definition, self.type_name, data)
             return self._layout(walk, root, data)
@@ -199,7 +199,7 @@ class Reader:
                 raise ValueError(f'a frame name of {frame.amount} bytes is not valid')
             name = frame._replace(amount=max(frame.amount - 1, 0))
             head = struct_at([stamp['sec'], stamp['nanosec'], name])
-        places = sorted({one.place for one in found if one.place is not None})
+        places = walk.places if self._reads_all else sorted({one.place for one in found if one.place is not None})
         order = tuple(places.index(one.place) if one.place is not None else -1 for one in found)
         return _Layout(
             guard,
@@ -207,7 +207,7 @@ class Reader:
             head,
             struct_at(places),
             order,
-            order == tuple(range(len(places))),
+            self._reads_all or order == tuple(range(len(places))),
             tuple(one.missing for one in found if one.missing),
         )
 

@@ -17,12 +17,13 @@ from itertools import chain, islice
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.messages.cdr import ENCAPSULATION
-from seal_friction_ros.core.messages.coder import unpacked
-from seal_friction_ros.core.messages.layouts import LAYOUTS, MACHINE_TYPE, NEWEST_TYPE, SECOND, struct_of
+from seal_friction_ros.core.messages.fields import Reader
+from seal_friction_ros.core.messages.layouts import DEFINITIONS, LAYOUTS, MACHINE_TYPE, NEWEST_TYPE, SECOND, struct_of
 from seal_friction_ros.core.messages.records import FeedForward, FrictionEstimate, Output
 
 _COUNTS = {layout.record: len(layout.codes) for layout in LAYOUTS if layout.record in (FrictionEstimate, FeedForward)}
 """Record of an answer -> how many numbers it has, in the order of the message."""
+_MACHINE, _NEWEST = Reader(DEFINITIONS, MACHINE_TYPE), Reader(DEFINITIONS, NEWEST_TYPE)
 
 
 class NamedAnswer(NamedTuple):
@@ -70,7 +71,7 @@ def decode_together(data: bytes) -> list[NamedAnswer]:
     Raises:
         ValueError: The bytes are not such a message.
     """
-    values = islice(unpacked(MACHINE_TYPE, data), 5, None)  # behind the header
+    values: Iterator[Any] = islice(_MACHINE.read(data).numbers, 5, None)  # behind the header
     answers: list[NamedAnswer] = []
     for record, numbers in _COUNTS.items():
         names = [_text(values) for _ in range(next(values))]
@@ -110,7 +111,7 @@ def decode_newest(data: bytes) -> list[TopicMessage]:
     Raises:
         ValueError: The bytes are not such a message.
     """
-    values = iter(unpacked(NEWEST_TYPE, data)[1:])
+    values: Iterator[Any] = iter(_NEWEST.read(data).numbers[1:])
     labels = [(_text(values), *islice(values, 2)) for _ in range(next(values))]
     _, total, together = values
     told = sum(size for _, size, _ in labels)

@@ -22,6 +22,7 @@ from typing import Any, NamedTuple, Self
 
 import yaml
 
+from seal_friction_ros.core.messages.cdr import ENCODING
 from seal_friction_ros.core.messages.coder import DECODERS
 from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, PACKAGE
 from seal_friction_ros.files import parse_yaml, read_yaml, share_directory
@@ -191,7 +192,7 @@ class BagWriter:
             topic: Its topic.
             type_name: Its type.
             log_time: [ns]
-            data: CDR.
+            data: Its bytes.
             publish_time: [ns] on any clock; default: the recorded log time.
             description: Of the topic; optional if the type is installed.
 
@@ -365,7 +366,7 @@ def _topic_metadata(topic: str, description: Description) -> dict[str, Any]:
     return {
         'name': topic,
         'type': description.type_name,
-        'serialization_format': 'cdr',
+        'serialization_format': ENCODING,
         'offered_qos_profiles': _parsed(description.metadata['offered_qos_profiles']),
         'type_description_hash': description.metadata['topic_type_hash'],
     }

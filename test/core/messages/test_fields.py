@@ -12,13 +12,7 @@ from hypothesis import strategies as st
 from rclpy.serialization import serialize_message
 
 from seal_friction_ros.core.foundation.documents import DEEPEST
-from seal_friction_ros.core.messages.definitions import (
-    Field,
-    full_name,
-    number_paths,
-    parse_definition,
-    short_name,
-)
+from seal_friction_ros.core.messages.definitions import Field, full_name, number_paths, parse_definition, short_name
 from seal_friction_ros.core.messages.fields import LARGEST_MESSAGE, Reader, names_in
 from seal_friction_ros.offline.bags.bag import message_definition
 
