@@ -33,7 +33,7 @@ from seal_friction_ros.core.messages.compiled_coder import (
     body_size,
     is_message,
     numbers_of,
-    room_for,
+    outbox_for,
     stamp_at,
     writer,
 )
@@ -81,7 +81,7 @@ _ANSWERS: dict[type, tuple[int, Layout]] = {
     FeedForward: (1, LAYOUT_OF[FEEDFORWARD_TYPE]),
 }
 """Record of an answer -> its column in `Outbox`, and its layout."""
-_BODY_SIZES = tuple(body_size(layout) for _, layout in _ANSWERS.values())  # [bytes]
+_ANSWERS_SIZE = sum(body_size(layout) for _, layout in _ANSWERS.values())  # [bytes] of the numbers of both
 
 
 class Answers(NamedTuple):
@@ -109,29 +109,16 @@ def receive_all(
     """
     if not _fits(state):
         raise UnsuitedError('a whole number in the state')
-    wrong, room = _check(*messages)
-    if wrong >= 0:
-        raise UnsuitedError(f'message {wrong}')
-    small = np.zeros(room, np.uint8)
-    places = np.zeros((2, 2, len(messages.kinds)), np.int64)
-    outbox = Outbox(
-        small,
-        small.view(np.uint32),
-        small.view(np.float64),
-        places[0],
-        places[1],
-        np.zeros(1, np.int64),
-        np.zeros(16),
-        messages.data,
-        messages.offsets,
-    )
+    outbox = outbox_for(messages, np.isin(messages.kinds, (_TICK, _VELOCITY)), _ANSWERS_SIZE)
     state, wrong = _receive_all(
-        for_compiler(parameters), state, messages.kinds, messages.received, messages.sent, outbox
+        for_compiler(parameters), state, messages.kinds, messages.sizes, messages.received, messages.sent, outbox
     )
     if wrong >= 0:
-        raise UnsuitedError(f'an answer to message {wrong} is not finite')
-    (estimates, feedforwards), (estimate_sizes, feedforward_sizes) = places
-    return state, Answers(small, estimates, estimate_sizes, feedforwards, feedforward_sizes)
+        raise UnsuitedError(
+            f'message {wrong}' if outbox.cursor[0] >= 0 else f'an answer to message {wrong} is not finite'
+        )
+    (estimates, feedforwards), (estimate_sizes, feedforward_sizes) = outbox.offsets, outbox.sizes
+    return state, Answers(outbox.small, estimates, estimate_sizes, feedforwards, feedforward_sizes)
 
 
 def _fits(value: Any) -> bool:
@@ -145,41 +132,25 @@ def _fits(value: Any) -> bool:
 
 
 @compiled
-def _check(
-    data: Bytes, kinds: Bytes, offsets: Integers, sizes: Integers, received: Integers, sent: Integers
-) -> tuple[int, int]:
-    """Check inputs as `coder.decode` does.
-
-    Returns:
-        The first message that is not of its kind, or -1; and the room [bytes] that all answers may need.
-    """
-    room = 0
-    for i in range(len(kinds)):
-        kind, offset = kinds[i], offsets[i]
-        if not _FORCE <= kind <= _VELOCITY:
-            continue
-        if not (0 <= received[i] <= LATEST and 0 <= sent[i] <= LATEST):
-            return i, 0
-        if not is_message(data, offset, sizes[i], _NUMBERS[kind]):
-            return i, 0
-        if kind == _VELOCITY:
-            room += room_for(data, offset, _BODY_SIZES[0])
-        if kind >= _TICK:
-            room += room_for(data, offset, _BODY_SIZES[1])
-    return -1, room
-
-
-@compiled
 def _receive_all(
-    parameters: Any, state: PipelineState, kinds: Bytes, receipts: Integers, sent: Integers, outbox: Any
+    parameters: Any,
+    state: PipelineState,
+    kinds: Bytes,
+    sizes: Integers,
+    receipts: Integers,
+    sent: Integers,
+    outbox: Any,
 ) -> tuple[PipelineState, int]:
-    """The pass; the number of the first message whose answer is not finite, or -1."""
+    """The pass; the number of the first message that is not of its kind or whose answer is not finite, or -1."""
     data, message_offsets, cursor = outbox.data, outbox.message_offsets, outbox.cursor
     for i in range(len(kinds)):
         kind = kinds[i]
         if not _FORCE <= kind <= _VELOCITY:
             continue
         offset, received = message_offsets[i], receipts[i]
+        in_bounds = 0 <= received <= LATEST and 0 <= sent[i] <= LATEST
+        if not (in_bounds and is_message(data, offset, sizes[i], _NUMBERS[kind])):
+            return state, i
         since = acting_since(parameters.feedforward, received, sent[i])
         stamp = stamp_at(data, offset)
         first, second, third = numbers_of(data, offset, _NUMBERS[kind])

@@ -6,13 +6,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from seal_friction_ros.core.foundation.arrays import BoolArray
 from seal_friction_ros.core.foundation.compiled import compiled
 from seal_friction_ros.core.messages import layouts
-from seal_friction_ros.core.messages.blocks import Bytes
+from seal_friction_ros.core.messages.blocks import Bytes, Messages
 from seal_friction_ros.core.messages.cdr import LITTLE_ENDIAN, ORIGIN
 from seal_friction_ros.core.messages.layouts import FRAME_AT, LENGTH_AT, LONGEST_FRAME, Layout, numbers_at
 
 _FIRST, _SECOND = LITTLE_ENDIAN
+_LARGEST = 2048  # [bytes] a message with numbers and the longest frame name has fewer
 _SLOT = 8 - ORIGIN  # [bytes] before a message in an `Outbox`, so that its numbers stand at multiples of 8
 
 
@@ -79,11 +81,19 @@ def body_size(layout: Layout) -> int:
     return (layout.size + 7) // 8 * 8
 
 
-@compiled
-def room_for(data: Bytes, offset: int, body: int) -> int:
-    """Room [bytes] in an `Outbox` for an answer with ``body`` bytes of numbers to the message at an offset."""
-    length = max(integer_at(data, offset + LENGTH_AT, 4), 1)  # an empty name gets its end
-    return int(_SLOT + numbers_at(length) + body)
+def outbox_for(messages: Messages, is_answered: BoolArray, numbers_size: int) -> Outbox:
+    """Empty outbox with room for an estimate and a feed-forward to each message that may be answered.
+
+    Args:
+        messages: All messages.
+        is_answered: Which of them.
+        numbers_size: Of the numbers of both answers [bytes].
+    """
+    heads = (np.minimum(messages.sizes[is_answered], _LARGEST) + 23) // 8 * 8  # at most that of the message and 12 more
+    small = np.zeros(2 * int(heads.sum()) + len(heads) * numbers_size, np.uint8)
+    offsets, sizes = np.zeros((2, 2, len(messages.kinds)), np.int64)
+    views = small, small.view(np.uint32), small.view(np.float64)
+    return Outbox(*views, offsets, sizes, np.zeros(1, np.int64), np.zeros(16), messages.data, messages.offsets)
 
 
 @cache
