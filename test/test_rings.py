@@ -169,7 +169,7 @@ def test_no_modules_import_each_other_in_a_circle():
 
 BYTES_OF_MESSAGES = re.compile(
     r"""(?<!messages\.)\bcdr\b | import\ struct\b | unpack_from | \.pack\( | (from|to)_bytes\( | b'\\(x00|0)
-    | ENCAPSULATION | LITTLE_ENDIAN | (SECONDS|LENGTH|FRAME)_AT\b | \bnumbers_at\b | \bstruct_(at|of)\b | \blaid_out\b""",
+    | ENCAPSULATION | _ENDIAN | (SECONDS|LENGTH|FRAME)_AT\b | \bnumbers_at\b | \bstruct_(at|of)\b | \blaid_out\b""",
     re.VERBOSE | re.IGNORECASE,
 )
 CONTAINERS = {f'offline/bags/{name}.py' for name in ('mcap_reader', 'mcap_writer', 'block_reader')}
