@@ -28,15 +28,7 @@ from seal_friction_ros.core.estimation.pipeline import (
 )
 from seal_friction_ros.core.foundation.compiled import INNER, compiled, for_compiler
 from seal_friction_ros.core.messages.blocks import Bytes, Integers, Kind, Messages, UnsuitedError
-from seal_friction_ros.core.messages.compiled_coder import (
-    Outbox,
-    body_size,
-    is_message,
-    numbers_of,
-    outbox_for,
-    stamp_at,
-    writer,
-)
+from seal_friction_ros.core.messages.compiled_coder import Outbox, body_size, is_message, message_at, outbox_for, writer
 from seal_friction_ros.core.messages.layouts import (
     ESTIMATE_TYPE,
     FEEDFORWARD_TYPE,
@@ -118,7 +110,8 @@ def receive_all(
             f'message {wrong}' if outbox.cursor[0] >= 0 else f'an answer to message {wrong} is not finite'
         )
     (estimates, feedforwards), (estimate_sizes, feedforward_sizes) = outbox.offsets, outbox.sizes
-    return state, Answers(outbox.small, estimates, estimate_sizes, feedforwards, feedforward_sizes)
+    data = outbox.small[: outbox.cursor[0]]
+    return state, Answers(data, estimates, estimate_sizes, feedforwards, feedforward_sizes)
 
 
 def _fits(value: Any) -> bool:
@@ -152,8 +145,7 @@ def _receive_all(
         if not (in_bounds and is_message(data, offset, sizes[i], _NUMBERS[kind])):
             return state, i
         since = acting_since(parameters.feedforward, received, sent[i])
-        stamp = stamp_at(data, offset)
-        first, second, third = numbers_of(data, offset, _NUMBERS[kind])
+        stamp, first, second, third = message_at(data, offset, _NUMBERS[kind])
         if kind == _VELOCITY:
             state = receive_velocity(parameters, state, Velocity(stamp, first, i), received, since, outbox)
         elif kind == _PRESSURE:

@@ -60,20 +60,15 @@ def is_message(data: Bytes, offset: int, size: int, count: int) -> bool:
 
 
 @compiled
-def stamp_at(data: Bytes, offset: int) -> int:
-    """Stamp [ns] of the message at an offset."""
+def message_at(data: Bytes, offset: int, count: int) -> tuple[int, float, float, float]:
+    """Stamp [ns] and the first ``count`` numbers, 1 to 3, all float64, of the message at an offset; then zeros."""
     seconds = np.int64(np.int32(np.uint32(integer_at(data, offset + layouts.SECONDS_AT, 4))))
-    return int(seconds * layouts.SECOND + integer_at(data, offset + layouts.NANOSECONDS_AT, 4))
-
-
-@compiled
-def numbers_of(data: Bytes, offset: int, count: int) -> tuple[float, float, float]:
-    """The first ``count`` numbers of the message at an offset, 1 to 3, all float64; then zeros."""
+    stamp = int(seconds * layouts.SECOND + integer_at(data, offset + layouts.NANOSECONDS_AT, 4))
     place = offset + numbers_at(integer_at(data, offset + LENGTH_AT, 4))
     first = _number(data, place)
     second = _number(data, place + 8) if count > 1 else 0.0
     third = _number(data, place + 16) if count > 2 else 0.0
-    return first, second, third
+    return stamp, first, second, third
 
 
 def body_size(layout: Layout) -> int:
