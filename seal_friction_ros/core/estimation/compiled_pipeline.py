@@ -10,7 +10,6 @@ refused (`UnsuitedError`); `pipeline.receive` then decides about them.
 
 from typing import Any, NamedTuple
 
-import numpy as np
 from numba import literal_unroll
 from numba.extending import overload
 
@@ -101,7 +100,8 @@ def receive_all(
     """
     if not _fits(state):
         raise UnsuitedError('a whole number in the state')
-    outbox = outbox_for(messages, np.isin(messages.kinds, (_TICK, _VELOCITY)), _ANSWERS_SIZE)
+    is_answered = (messages.kinds == _TICK) | (messages.kinds == _VELOCITY)
+    outbox = outbox_for(messages, is_answered, _ANSWERS_SIZE)
     state, wrong = _receive_all(
         for_compiler(parameters), state, messages.kinds, messages.sizes, messages.received, messages.sent, outbox
     )
