@@ -14,10 +14,11 @@ from functools import partial
 from one_core import processor_time
 
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, init, step
-from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample
+from seal_friction_ros.core.estimation.records import RodSample
 from seal_friction_ros.core.friction.actuator import MountedSeal, Seal, Uncertainty
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.lubrication.friction_map import friction_map, map_pressures, memory_length, steady_friction
+from seal_friction_ros.core.messages.records import Force, Pressure
 from seal_friction_ros.files import default_configuration
 from seal_friction_studies.core.study_case import StudyCase
 from seal_friction_studies.core.transient import run_transient

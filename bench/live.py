@@ -46,8 +46,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
 from harness.compensation import LIVE
 from harness.processes import free_domain, graph_environment, node_process
 
-from seal_friction_ros.core.estimation.messages import encode
-from seal_friction_ros.core.estimation.records import Force, Pressure, Velocity
+from seal_friction_ros.core.messages.coder import encode
+from seal_friction_ros.core.messages.records import Force, Pressure, Velocity
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.discovery import PROFILES
 from seal_friction_ros.nodes.executor import spin

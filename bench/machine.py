@@ -46,9 +46,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
 from harness.compensation import LIVE, SCALE
 from harness.processes import free_domain, graph_environment, node_process
 
-from seal_friction_ros.core.estimation.feedforward import FeedForward
-from seal_friction_ros.core.estimation.messages import encode
-from seal_friction_ros.core.estimation.records import NO_ESTIMATE
+from seal_friction_ros.core.messages.coder import encode
+from seal_friction_ros.core.messages.records import NO_ESTIMATE, FeedForward
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.executor import spin

@@ -35,10 +35,12 @@ from harness.processes import free_domain
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, step
 from seal_friction_ros.core.estimation.estimator import init as init_estimator
-from seal_friction_ros.core.estimation.messages import PRESSURE_TYPE, VELOCITY_TYPE, Output, decode, encode
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters, init, init_running, receive
-from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample, ServoReference, Velocity
+from seal_friction_ros.core.estimation.records import RodSample
 from seal_friction_ros.core.friction.presliding import Presliding
+from seal_friction_ros.core.messages.coder import decode, encode
+from seal_friction_ros.core.messages.layouts import PRESSURE_TYPE, VELOCITY_TYPE
+from seal_friction_ros.core.messages.records import Force, Output, Pressure, ServoReference, Velocity
 from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.offline.bags.recorder import Recorder
 

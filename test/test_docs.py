@@ -20,10 +20,9 @@ from paths import ROOT
 from rclpy.node import Node
 from seal_friction_msgs.msg import FrictionFeedForward
 
-from seal_friction_ros.core.estimation.feedforward import Limited
-from seal_friction_ros.core.estimation.messages import INPUTS
 from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS
-from seal_friction_ros.core.estimation.records import Status
+from seal_friction_ros.core.messages.layouts import INPUTS
+from seal_friction_ros.core.messages.records import Limited, Status
 from seal_friction_ros.core.servo.simulator_options import SERVO_SIMULATOR_PARAMETERS
 from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics
 from seal_friction_ros.nodes.graph_watch import GraphFindings

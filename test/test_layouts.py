@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import pytest
 from paths import ROOT
 
-from seal_friction_ros.core.estimation.messages import INPUTS, OUTPUTS
+from seal_friction_ros.core.messages.layouts import INPUTS, OUTPUTS
 from seal_friction_ros.nodes.managed_node import message_class
 
 LAYOUTS = ROOT / 'config' / 'layouts'

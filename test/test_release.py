@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from paths import ROOT
 
-from seal_friction_ros.core.estimation.messages import INPUTS
+from seal_friction_ros.core.messages.layouts import INPUTS
 
 
 def manifest(path: Path) -> str:

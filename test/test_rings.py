@@ -4,6 +4,7 @@ Within core and within offline a room imports only from rooms before it.
 """
 
 import ast
+import re
 import sys
 
 import pytest
@@ -25,6 +26,7 @@ ROOMS = {  # in order; rooms on one line do not import from each other
     'core': (
         ('foundation',),
         ('friction',),
+        ('messages',),
         ('estimation', 'identification', 'oring_contact'),
         ('lubrication',),
         ('servo', 'machine'),
@@ -39,7 +41,7 @@ ROOMS = {  # in order; rooms on one line do not import from each other
         ('commands',),
     ),
 }
-MOST_ENTRIES = 10  # of core and of offline: what a newcomer reads at a glance
+MOST_ROOMS = 10  # of core and of offline: what a newcomer reads at a glance
 SHARED_WITH_NODES = {
     f'{PACKAGE}.offline.{part}' for part in ('bags.recorder', 'bags.bag', 'bags.definitions', 'monitor')
 }
@@ -166,9 +168,9 @@ def test_a_room_imports_only_from_rooms_before_it(ring):
 
 @pytest.mark.parametrize('ring', ROOMS)
 def test_the_rooms_fit_on_a_glance(ring):
-    entries = {path.name for path in (SOURCES / ring).iterdir() if path.name != '__pycache__'}
-    assert entries == {'__init__.py', *(room for rooms in ROOMS[ring] for room in rooms)}
-    assert len(entries) <= MOST_ENTRIES
+    entries = {path.name for path in (SOURCES / ring).iterdir()} - {'__pycache__', '__init__.py'}
+    assert entries == {room for rooms in ROOMS[ring] for room in rooms}
+    assert len(entries) <= MOST_ROOMS
 
 
 def circle_among(modules: dict[str, set[str]]) -> list[str]:
@@ -195,6 +197,37 @@ def test_no_modules_import_each_other_in_a_circle():
     modules = {name: {part for full in imported(file.read_text()) for part in (full, full.rpartition('.')[0])}
                for name, file in files.items()}  # fmt: skip
     assert not circle_among(modules)
+
+
+BYTES_OF_MESSAGES = re.compile(
+    r"""(?<!messages\.)\bcdr\b | import\ struct\b | unpack_from | \.pack\( | (from|to)_bytes\( | b'\\(x00|0)
+    | ENCAPSULATION | _ENDIAN | (SECONDS|LENGTH|FRAME)_AT\b | \bnumbers_at\b | \bstruct_(at|of)\b | \blaid_out\b""",
+    re.VERBOSE | re.IGNORECASE,
+)
+CONTAINERS = {f'offline/bags/{name}.py' for name in ('mcap_reader', 'mcap_writer', 'block_reader')}
+"""They lay out the records of MCAP, in which a message is bytes."""
+
+
+def bytes_of_messages(source: str) -> list[str]:
+    """Lines of a source about the bytes of messages."""
+    return [line for line in source.splitlines() if BYTES_OF_MESSAGES.search(line)]
+
+
+def test_what_a_source_says_about_the_bytes_of_messages_is_found():
+    for source in (
+        'import struct\n', 'x = int.from_bytes(data[12:16])\n', "head = b'\\x00\\x01'\n", '# aligned as in CDR\n',
+        'from seal_friction_ros.core.messages.layouts import FRAME_AT\n',
+    ):  # fmt: skip
+        assert bytes_of_messages(source)
+    assert not bytes_of_messages('from seal_friction_ros.core.messages.coder import decode\n')
+
+
+def test_no_file_outside_the_room_of_the_messages_knows_where_a_number_of_a_message_stands():
+    files = {file.relative_to(SOURCES).as_posix(): file.read_text() for file in SOURCES.rglob('*.py')}
+    known = {file: lines for file, source in files.items() if (lines := bytes_of_messages(source))}
+    room = {file for file in known if file.startswith('core/messages/')}
+    assert room
+    assert {file: known[file] for file in known.keys() - room - CONTAINERS} == {}
 
 
 def test_nodes_do_no_arithmetic_with_numpy():

@@ -17,15 +17,15 @@ import yaml
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
 from harness.processes import free_domain, play_live
 
-from seal_friction_ros.core.estimation.messages import (
+from seal_friction_ros.core.messages.coder import encode
+from seal_friction_ros.core.messages.layouts import (
     FORCE_TYPE,
     POSITION_TYPE,
     PRESSURE_TYPE,
     REFERENCE_TYPE,
     VELOCITY_TYPE,
-    encode,
 )
-from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
+from seal_friction_ros.core.messages.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.offline.bags.bag import (
     FORCE_TOPIC,
     POSITION_TOPIC,

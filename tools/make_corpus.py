@@ -16,8 +16,10 @@ import zstandard
 from mcap.writer import CompressionType, Writer
 
 from seal_friction_ros.core.estimation.configuration import first_snapshot, snapshot_text
-from seal_friction_ros.core.estimation.feedforward import FeedForward
-from seal_friction_ros.core.estimation.messages import (
+from seal_friction_ros.core.estimation.pipeline import answered, init
+from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages.coder import decode, encode, encode_text
+from seal_friction_ros.core.messages.layouts import (
     CONFIGURATION_TYPE,
     ESTIMATE_TYPE,
     FEEDFORWARD_TYPE,
@@ -26,12 +28,9 @@ from seal_friction_ros.core.estimation.messages import (
     PRESSURE_TYPE,
     REFERENCE_TYPE,
     VELOCITY_TYPE,
-    decode,
-    encode,
-    encode_text,
 )
-from seal_friction_ros.core.estimation.pipeline import answered, init
-from seal_friction_ros.core.estimation.records import (
+from seal_friction_ros.core.messages.records import (
+    FeedForward,
     Force,
     FrictionEstimate,
     Position,
@@ -39,7 +38,6 @@ from seal_friction_ros.core.estimation.records import (
     ServoReference,
     Velocity,
 )
-from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.bags.mcap_reader import MAGIC
 

@@ -15,7 +15,7 @@ from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 from seal_friction_msgs.msg import FrictionEstimate
 
-from seal_friction_ros.core.estimation.messages import INPUTS, VELOCITY_TYPE
+from seal_friction_ros.core.messages.layouts import INPUTS, VELOCITY_TYPE
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.estimator_diagnostics import latency_values
 from seal_friction_ros.nodes.executor import run_tool

@@ -8,10 +8,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationState
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorState
-from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
-from seal_friction_ros.core.estimation.messages import CLOCK_TOPIC, INPUTS, Output
 from seal_friction_ros.core.estimation.pipeline import Turn
-from seal_friction_ros.core.estimation.records import NEVER, NO_ESTIMATE, FrictionEstimate, Status
 from seal_friction_ros.core.estimation.seal_health import (
     SealHealth,
     Starts,
@@ -21,6 +18,16 @@ from seal_friction_ros.core.estimation.seal_health import (
     with_sample,
 )
 from seal_friction_ros.core.estimation.swings import NO_SWING, Swing
+from seal_friction_ros.core.messages.layouts import CLOCK_TOPIC, INPUTS
+from seal_friction_ros.core.messages.records import (
+    NEVER,
+    NO_ESTIMATE,
+    FeedForward,
+    FrictionEstimate,
+    Limited,
+    Output,
+    Status,
+)
 from seal_friction_ros.nodes.graph_watch import GraphFindings
 from seal_friction_ros.nodes.managed_node import status_of
 

@@ -17,19 +17,7 @@ from std_srvs.srv import Trigger
 from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationSettings
 from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING, Configuration, SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
-from seal_friction_ros.core.estimation.feedforward import FeedForward, FeedForwardSettings
-from seal_friction_ros.core.estimation.messages import (
-    CLOCK_TOPIC,
-    CLOCK_TYPE,
-    CONFIGURATION_TYPE,
-    ESTIMATE_TYPE,
-    OUTPUTS,
-    TICK_TYPE,
-    Output,
-    encode,
-    encode_text,
-    type_of,
-)
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.node_options import (
     ADAPTATION_PREFIX,
     FEEDFORWARD_PREFIX,
@@ -37,9 +25,7 @@ from seal_friction_ros.core.estimation.node_options import (
     MachineOptions,
     RecordingOptions,
 )
-from seal_friction_ros.core.estimation.records import WatchdogTick
 from seal_friction_ros.core.foundation.parameters import ParameterGroup
-from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, NamedAnswer, encode_together
 from seal_friction_ros.core.machine.gauge_or_absolute import Lowest, pressure_remarks
 from seal_friction_ros.core.machine.machine import (
     Machine,
@@ -55,9 +41,21 @@ from seal_friction_ros.core.machine.machine import (
 )
 from seal_friction_ros.core.machine.machine_file import Actuator, MachineFile, own_file
 from seal_friction_ros.core.machine.machine_snapshot import machine_text, snapshot_of
-from seal_friction_ros.core.machine.message_fields import full_name, parse_definition
-from seal_friction_ros.core.machine.newest_messages import NEWEST_TYPE, TopicMessage, encode_newest
 from seal_friction_ros.core.machine.outputs import Command, due_commands
+from seal_friction_ros.core.messages.coder import encode, encode_text, type_of
+from seal_friction_ros.core.messages.definitions import full_name, parse_definition
+from seal_friction_ros.core.messages.layouts import (
+    CLOCK_TOPIC,
+    CLOCK_TYPE,
+    CONFIGURATION_TYPE,
+    ESTIMATE_TYPE,
+    MACHINE_TYPE,
+    NEWEST_TYPE,
+    OUTPUTS,
+    TICK_TYPE,
+)
+from seal_friction_ros.core.messages.records import FeedForward, Output, WatchdogTick
+from seal_friction_ros.core.messages.together import NamedAnswer, TopicMessage, encode_newest, encode_together
 from seal_friction_ros.files import load_configuration, read_machine
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics

@@ -25,9 +25,8 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.utilities import remove_ros_args
 
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE
-from seal_friction_ros.core.machine.message_fields import Definition, full_name, parse_definition
-from seal_friction_ros.core.machine.newest_messages import NEWEST_TYPE
+from seal_friction_ros.core.messages.definitions import Definition, full_name, parse_definition
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, NEWEST_TYPE
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.executor import run
 from seal_friction_ros.nodes.managed_node import message_class

@@ -14,12 +14,12 @@ from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from seal_friction_ros.core.estimation.configuration import SealSelection
-from seal_friction_ros.core.estimation.feedforward import FeedForward
-from seal_friction_ros.core.estimation.messages import FEEDFORWARD_TYPE, INPUTS, REFERENCE_TYPE, decode, encode
-from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.core.foundation.compiled import has_compiler
 from seal_friction_ros.core.foundation.parameters import ParameterGroup
 from seal_friction_ros.core.friction.force_sum_correction import NO_CORRECTION, measured_force_sum, one_correction
+from seal_friction_ros.core.messages.coder import decode, encode
+from seal_friction_ros.core.messages.layouts import FEEDFORWARD_TYPE, INPUTS, REFERENCE_TYPE
+from seal_friction_ros.core.messages.records import FeedForward, Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.core.servo.controller import Limited
 from seal_friction_ros.core.servo.cylinder import pressure_force
 from seal_friction_ros.core.servo.motions import PullTest, RoundedWave, Setpoint, Wave

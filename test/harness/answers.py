@@ -2,9 +2,8 @@
 
 from typing import Any, NamedTuple
 
-from seal_friction_ros.core.estimation.feedforward import FeedForward
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, receive
-from seal_friction_ros.core.estimation.records import FrictionEstimate
+from seal_friction_ros.core.messages.records import FeedForward, FrictionEstimate
 
 
 class Answer(NamedTuple):

@@ -5,15 +5,9 @@ from pathlib import Path
 from harness.compensation import SCALE, compensating
 from seal_friction_ros.core.estimation import pipeline
 from seal_friction_ros.core.estimation.configuration import Snapshot, snapshot_text
-from seal_friction_ros.core.estimation.messages import (
-    CONFIGURATION_TYPE,
-    FEEDFORWARD_TYPE,
-    INPUTS,
-    decode,
-    encode,
-    encode_text,
-)
-from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
+from seal_friction_ros.core.messages.coder import decode, encode, encode_text
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, FEEDFORWARD_TYPE, INPUTS
+from seal_friction_ros.core.messages.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.core.servo.motions import Sine, Wave
 from seal_friction_ros.core.servo.position_servo import ServoParameters, init, outputs, step
 from seal_friction_ros.offline.bags import bag as b

@@ -4,8 +4,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from seal_friction_ros.core.estimation.messages import Output
 from seal_friction_ros.core.machine.machine import due
+from seal_friction_ros.core.messages.records import Output
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 
 

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from paths import ROOT
 
-from seal_friction_ros.core.estimation.messages import FORCE_TYPE, POSITION_TYPE, PRESSURE_TYPE, VELOCITY_TYPE, encode
-from seal_friction_ros.core.estimation.records import Force, Position, Pressure, Velocity
+from seal_friction_ros.core.messages.coder import encode
+from seal_friction_ros.core.messages.layouts import FORCE_TYPE, POSITION_TYPE, PRESSURE_TYPE, VELOCITY_TYPE
+from seal_friction_ros.core.messages.records import Force, Position, Pressure, Velocity
 from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_studies.core.kinematics import ConstantAcceleration

@@ -5,21 +5,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from seal_friction_ros.core.estimation.configuration import (
-    Configuration,
-    first_snapshot,
-    parse_snapshot,
-    snapshot_text,
-)
-from seal_friction_ros.core.estimation.messages import (
-    CONFIGURATION_TYPE,
-    INPUTS,
-    decode_text,
-    encode,
-    encode_text,
-    type_of,
-)
-from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
+from seal_friction_ros.core.estimation.configuration import Configuration, first_snapshot, parse_snapshot, snapshot_text
+from seal_friction_ros.core.messages.coder import decode_text, encode, encode_text, type_of
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, INPUTS
+from seal_friction_ros.core.messages.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.replay.replay import replay
 

@@ -12,7 +12,8 @@ from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings, step
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters, init_running
-from seal_friction_ros.core.estimation.records import Force, FrictionEstimate, Pressure, RodSample
+from seal_friction_ros.core.estimation.records import RodSample
+from seal_friction_ros.core.messages.records import Force, FrictionEstimate, Pressure
 from seal_friction_ros.files import load_configuration, read_yaml
 from seal_friction_ros.offline.commands.main import main
 

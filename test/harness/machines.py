@@ -9,8 +9,9 @@ from rclpy.serialization import serialize_message
 
 from seal_friction_ros.core.machine.machine import Machine, make_machine
 from seal_friction_ros.core.machine.machine_file import MachineFile, parse_machine
-from seal_friction_ros.core.machine.message_fields import Definition, definition_of_class
+from seal_friction_ros.core.messages.definitions import Definition, full_name, parse_definition
 from seal_friction_ros.files import machine_configurations
+from seal_friction_ros.offline.bags.bag import message_definition
 
 BENCH = """
 name: bench
@@ -56,7 +57,7 @@ def message_class(type_name: str) -> Any:
 
 def installed(type_name: str) -> Definition:
     """Definition of an installed type."""
-    return definition_of_class(type_name, lambda kind: message_class(kind).get_fields_and_field_types())
+    return parse_definition(type_name, message_definition(full_name(type_name))[0])
 
 
 def parsed(text: str, **changes: Any) -> MachineFile:

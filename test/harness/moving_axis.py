@@ -13,8 +13,9 @@ from rclpy.context import Context
 from rclpy.node import Node
 
 from harness.processes import graph_environment, node_process
-from seal_friction_ros.core.estimation.messages import INPUTS, encode
-from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
+from seal_friction_ros.core.messages.coder import encode
+from seal_friction_ros.core.messages.layouts import INPUTS
+from seal_friction_ros.core.messages.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.managed_node import message_class
 

@@ -11,8 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from seal_friction_ros.core.estimation.messages import INPUTS, encode, type_of
-from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample, Velocity
+from seal_friction_ros.core.estimation.records import RodSample
+from seal_friction_ros.core.messages.coder import encode, type_of
+from seal_friction_ros.core.messages.layouts import INPUTS
+from seal_friction_ros.core.messages.records import Force, Pressure, Velocity
 from seal_friction_ros.offline.bags.bag import BagWriter
 
 SECOND = 1_000_000_000  # [ns]

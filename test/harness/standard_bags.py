@@ -6,8 +6,9 @@ import numpy as np
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from harness.foreign_messages import foreign_store
-from seal_friction_ros.core.estimation.messages import INPUTS, decode
-from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
+from seal_friction_ros.core.messages.coder import decode
+from seal_friction_ros.core.messages.layouts import INPUTS
+from seal_friction_ros.core.messages.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.offline.bags.bag import read_messages
 
 AMBIENT = 100_000.0  # [Pa]

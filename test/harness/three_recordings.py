@@ -14,11 +14,12 @@ from harness.machines import installed
 from harness.standard_bags import MAPPING, write_standard
 from seal_friction_ros.core.estimation.configuration import Configuration, SealSelection, first_snapshot, snapshot_text
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, encode, encode_text, type_of
-from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.core.machine.machine import init, make_machine
 from seal_friction_ros.core.machine.machine_file import parse_machine
 from seal_friction_ros.core.machine.machine_snapshot import machine_text, snapshot_of
+from seal_friction_ros.core.messages.coder import encode, encode_text, type_of
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE
+from seal_friction_ros.core.messages.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.files import load_configuration, machine_configurations, read_yaml
 from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.replay.replay import replay

@@ -5,10 +5,9 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from seal_friction_ros.core.estimation.estimator import init
-from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
-from seal_friction_ros.core.estimation.messages import CLOCK_TOPIC, INPUTS
-from seal_friction_ros.core.estimation.records import NO_ESTIMATE, Status
 from seal_friction_ros.core.estimation.swings import NO_SWING
+from seal_friction_ros.core.messages.layouts import CLOCK_TOPIC, INPUTS
+from seal_friction_ros.core.messages.records import NO_ESTIMATE, FeedForward, Limited, Status
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics, MissingSamples
 from seal_friction_ros.nodes.graph_watch import GraphFindings

@@ -30,10 +30,10 @@ from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING,
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.friction_change import REFERENCE_REVERSALS
-from seal_friction_ros.core.estimation.messages import encode
 from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS, ROS_PARAMETERS
-from seal_friction_ros.core.estimation.records import Velocity
 from seal_friction_ros.core.friction.actuator import actuator_friction
+from seal_friction_ros.core.messages.coder import encode
+from seal_friction_ros.core.messages.records import Velocity
 from seal_friction_ros.files import default_configuration, load_parameter_file
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 from seal_friction_ros.offline.bags.actuator_bag import find_topics

@@ -15,7 +15,8 @@ from rosgraph_msgs.msg import Clock
 from seal_friction_msgs.msg import FrictionEstimate, FrictionFeedForward, ServoReference
 
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
-from seal_friction_ros.core.estimation.messages import FEEDFORWARD_TYPE, VELOCITY_TYPE, decode
+from seal_friction_ros.core.messages.coder import decode
+from seal_friction_ros.core.messages.layouts import FEEDFORWARD_TYPE, VELOCITY_TYPE
 from seal_friction_ros.offline.bags.bag import read_messages
 from seal_friction_ros.offline.replay.replay import replay
 

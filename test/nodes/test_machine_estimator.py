@@ -22,7 +22,7 @@ from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64MultiArray
 
 from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING
-from seal_friction_ros.core.estimation.records import Status
+from seal_friction_ros.core.messages.records import Status
 from seal_friction_ros.nodes.machine_estimator import MachineEstimator
 from seal_friction_ros.offline.bags.bag import bag_topics, read_messages
 from seal_friction_ros.offline.replay.replay import replay

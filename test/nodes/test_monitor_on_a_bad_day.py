@@ -18,7 +18,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, encode_text
+from seal_friction_ros.core.messages.coder import encode_text
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.managed_node import message_class
 

@@ -10,8 +10,8 @@ from rcl_interfaces.srv import SetParametersAtomically
 from seal_friction_msgs.msg import FrictionEstimate
 from std_srvs.srv import Trigger
 
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE
 from seal_friction_ros.core.estimation.node_options import RecordingOptions
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE
 from seal_friction_ros.nodes.recording import Recording
 from seal_friction_ros.offline.bags import mcap_writer, recorder
 from seal_friction_ros.offline.bags.bag import BagError, BagWriter, read_messages

@@ -27,7 +27,7 @@ from seal_friction_msgs.msg import (
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from seal_friction_ros.core.estimation.records import Status
+from seal_friction_ros.core.messages.records import Status
 from seal_friction_ros.core.servo.cylinder import AMBIENT
 from seal_friction_ros.core.servo.motions import Sine
 from seal_friction_ros.core.servo.simulator_options import StandardMessages

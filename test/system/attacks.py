@@ -21,10 +21,11 @@ from paths import ROOT
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, init, step
-from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample
+from seal_friction_ros.core.estimation.records import RodSample
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.core.messages.records import Force, Pressure
 from seal_friction_ros.files import read_yaml
 
 SEAL = parse_seal(read_yaml(ROOT / 'config' / 'seals' / 'ms28775_114.yaml'))

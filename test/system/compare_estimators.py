@@ -22,11 +22,12 @@ from harness.campaign import parser_of, tell_tables
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.estimator import init, step
-from seal_friction_ros.core.estimation.messages import DECODERS
-from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample, Velocity
+from seal_friction_ros.core.estimation.records import RodSample
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.friction.actuator import friction_of_seals
 from seal_friction_ros.core.friction.force_sum_correction import corrected_force_sum
+from seal_friction_ros.core.messages.coder import DECODERS
+from seal_friction_ros.core.messages.records import Force, Pressure, Velocity
 from seal_friction_ros.offline.bags.bag import read_messages
 from seal_friction_ros.offline.commands.main import main as command
 from seal_friction_ros.offline.replay.replay import chosen_configuration

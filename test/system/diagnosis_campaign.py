@@ -28,10 +28,11 @@ from paths import ROOT
 from seal_friction_ros.core.estimation import estimator
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, step
-from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample
+from seal_friction_ros.core.estimation.records import RodSample
 from seal_friction_ros.core.estimation.seal_health import SealHealth, findings, followed
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.seal_file import mount_seals, mounting_of, parse_seal
+from seal_friction_ros.core.messages.records import Force, Pressure
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.bags.import_log import read_samples
 from seal_friction_ros.offline.bags.rig_file import read_rig

@@ -31,7 +31,7 @@ from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters
-from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample, Status
+from seal_friction_ros.core.estimation.records import RodSample
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.friction.actuator import MountedSeal
@@ -39,6 +39,7 @@ from seal_friction_ros.core.friction.presliding import Presliding
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.identification.presliding_fit import PreslidingFit, ReversalLog, fit_presliding
+from seal_friction_ros.core.messages.records import Force, Pressure, Status
 from seal_friction_ros.core.servo.closed_loop import Axis, run_closed_loop
 from seal_friction_ros.core.servo.elastic_plant import ElasticSeals
 from seal_friction_ros.core.servo.motions import Setpoint, Sine

@@ -19,10 +19,11 @@ from harness.campaign import parser_of, tell
 from harness.compensation import compensating
 
 from seal_friction_ros.core.estimation.compiled_pipeline import receive_all
-from seal_friction_ros.core.estimation.message_blocks import MOST_MESSAGES, Kind, Messages
-from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, FEEDFORWARD_TYPE, decode, encode
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters, init
-from seal_friction_ros.core.estimation.records import Force, Pressure, ServoReference, Velocity
+from seal_friction_ros.core.messages.blocks import MOST_MESSAGES, Kind, Messages
+from seal_friction_ros.core.messages.coder import decode, encode
+from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE, FEEDFORWARD_TYPE
+from seal_friction_ros.core.messages.records import Force, Pressure, ServoReference, Velocity
 
 START = 1_700_000_000_000_000_000  # [ns]
 PRESSURE = 2e6  # [Pa]

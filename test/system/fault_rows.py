@@ -7,8 +7,8 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from seal_friction_ros.core.estimation.records import Force, Pressure, ServoReference, Velocity
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages.records import Force, Pressure, ServoReference, Velocity
 
 MS = 1_000_000  # [ns] between two ticks: 1 kHz
 TIMEOUT = 0.02  # [s] of pressure, force sum, estimate and reference

@@ -18,10 +18,11 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 
-from seal_friction_ros.core.estimation.feedforward import LONGEST_STEP, FeedForward, FeedForwardSettings, Limited
-from seal_friction_ros.core.estimation.messages import DECODERS, ESTIMATE_TYPE, INPUTS, OUTPUTS, encode
-from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
+from seal_friction_ros.core.estimation.feedforward import LONGEST_STEP, FeedForwardSettings
 from seal_friction_ros.core.foundation.limits import between
+from seal_friction_ros.core.messages.coder import DECODERS, encode
+from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE, INPUTS, OUTPUTS
+from seal_friction_ros.core.messages.records import FeedForward, FrictionEstimate, Limited, Status
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.managed_node import message_class
 from seal_friction_ros.offline.replay.replay import replay

@@ -21,9 +21,8 @@ from harness.campaign import parser_of, tell
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings
-from seal_friction_ros.core.estimation.feedforward import FeedForward, FeedForwardSettings
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters, init_running, receive
-from seal_friction_ros.core.estimation.records import Pressure, ServoReference, Velocity
 from seal_friction_ros.core.friction.actuator import MountedSeal, Seal
 from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
@@ -31,6 +30,7 @@ from seal_friction_ros.core.friction.laws.pressure_power_law import PressurePowe
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.presliding import Presliding
 from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.core.messages.records import FeedForward, Pressure, ServoReference, Velocity
 from seal_friction_ros.files import read_yaml
 
 SAMPLES = 30

@@ -31,8 +31,8 @@ from rich.table import Table
 from rich.text import Text
 
 from seal_friction_ros.core.estimation.configuration import parse_snapshot, snapshot_text
-from seal_friction_ros.core.estimation.messages import DECODERS
 from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.core.messages.coder import DECODERS
 from seal_friction_ros.files import load_parameter_file, read_yaml
 from seal_friction_ros.offline.bags import mcap_reader
 from seal_friction_ros.offline.bags.bag import bag_topics, read_messages
@@ -114,7 +114,7 @@ def log_reader() -> Callable[[Path], None]:
 
 def bulk_reader() -> Callable[[Path], None]:
     """Bulk reader of bags: what it accepts it must read like the general reader."""
-    from seal_friction_ros.core.estimation.message_blocks import Kind, UnsuitedError  # noqa: PLC0415  loads the compiler
+    from seal_friction_ros.core.messages.blocks import Kind, UnsuitedError  # noqa: PLC0415  loads the compiler
     from seal_friction_ros.offline.bags.block_reader import compile_now, read_in_bulk  # noqa: PLC0415  the compiler is slow to load
 
     compile_now()

@@ -25,8 +25,7 @@ from seal_friction_msgs.msg import CylinderPressure, FrictionEstimate, RodVeloci
 from std_msgs.msg import Float64
 
 from seal_friction_ros.core.estimation import records
-from seal_friction_ros.core.estimation.feedforward import FeedForward
-from seal_friction_ros.core.estimation.records import Status
+from seal_friction_ros.core.messages.records import FeedForward, Status
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 from seal_friction_ros.offline.bags import mcap_writer

@@ -24,9 +24,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from harness.campaign import parser_of, tell
 
 from seal_friction_ros.core.estimation.configuration import first_snapshot, snapshot_text
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, INPUTS, Input, encode, encode_text
 from seal_friction_ros.core.estimation.pipeline import answered, init
-from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
+from seal_friction_ros.core.messages.coder import encode, encode_text
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, INPUTS
+from seal_friction_ros.core.messages.records import Force, Input, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.bags.actuator_bag import ANSWER_TOPICS

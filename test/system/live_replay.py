@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from harness.campaign import parser_of, tell
 from harness.processes import free_domain, play_live
 
-from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE
+from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE
 from seal_friction_ros.offline.bags.bag import read_messages
 from seal_friction_ros.offline.replay.replay import chosen_configuration, replay
 

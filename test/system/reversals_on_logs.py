@@ -15,9 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, VELOCITY_TYPE, decode
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages.coder import decode
+from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE, VELOCITY_TYPE
 from seal_friction_ros.offline.bags.bag import read_messages
 from seal_friction_ros.offline.commands.main import main as command
 

@@ -32,8 +32,9 @@ from harness.machines import EXCAVATOR
 from harness.processes import free_domain, node_process
 from harness.spin_nodes import SpunNodes, ros_context
 
-from seal_friction_ros.core.estimation.messages import INPUTS, encode
-from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Temperature, Velocity
+from seal_friction_ros.core.messages.coder import encode
+from seal_friction_ros.core.messages.layouts import INPUTS
+from seal_friction_ros.core.messages.records import Force, Position, Pressure, ServoReference, Temperature, Velocity
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.managed_node import message_class
 from seal_friction_ros.offline.replay.replay import replay

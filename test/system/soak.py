@@ -27,7 +27,8 @@ from harness.compensation import LIVE
 from harness.processes import free_domain, node_process
 from harness.spin_nodes import SpunNodes, ros_context
 
-from seal_friction_ros.core.estimation.messages import VELOCITY_TYPE, decode
+from seal_friction_ros.core.messages.coder import decode
+from seal_friction_ros.core.messages.layouts import VELOCITY_TYPE
 from seal_friction_ros.offline.bags.bag import VELOCITY_TOPIC, read_messages
 
 PERIOD = 1_000_000  # [ns] of the simulator

@@ -14,9 +14,9 @@ from test_docs import link_tree
 
 from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
-from seal_friction_ros.core.estimation.messages import decode
-from seal_friction_ros.core.estimation.records import Position, ServoReference
 from seal_friction_ros.core.friction.actuator import ActuatorFriction, actuator_friction
+from seal_friction_ros.core.messages.coder import decode
+from seal_friction_ros.core.messages.records import Position, ServoReference
 from seal_friction_ros.files import load_configuration, read_machine
 from seal_friction_ros.offline.bags.bag import read_messages
 from seal_friction_ros.offline.replay.replay import replay

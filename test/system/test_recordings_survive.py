@@ -22,7 +22,8 @@ RECORD_UNTIL_FULL = """
 import json, sys, time
 from pathlib import Path
 from typing import Any
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, decode_text, encode_text
+from seal_friction_ros.core.messages.coder import decode_text, encode_text
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE
 from seal_friction_ros.offline.bags.recorder import Recorder
 
 recorder = Recorder(Path(sys.argv[1]) / 'bag', split_size=200_000)
@@ -46,7 +47,8 @@ RECORD_AGAIN = """
 import json, shutil, sys, time
 from pathlib import Path
 from typing import Any
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, decode_text, encode_text
+from seal_friction_ros.core.messages.coder import decode_text, encode_text
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE
 from seal_friction_ros.offline.bags import recorder as module
 from seal_friction_ros.offline.bags.bag import read_messages
 

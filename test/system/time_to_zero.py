@@ -53,17 +53,15 @@ from lifecycle_msgs.srv import ChangeState
 from rclpy.context import Context
 
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
-from seal_friction_ros.core.estimation.messages import (
+from seal_friction_ros.core.messages.coder import DECODERS, encode, encode_text
+from seal_friction_ros.core.messages.layouts import (
     CLOCK_TOPIC,
     CLOCK_TYPE,
     CONFIGURATION_TYPE,
-    DECODERS,
     FEEDFORWARD_TYPE,
     INPUTS,
-    encode,
-    encode_text,
 )
-from seal_friction_ros.core.estimation.records import Clock, ServoReference
+from seal_friction_ros.core.messages.records import Clock, ServoReference
 from seal_friction_ros.files import share_directory
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.discovery import PROFILES, set_up_discovery

@@ -27,12 +27,12 @@ from seal_friction_ros.core.estimation.friction_filter import (
     friction_magnitude,
     updated,
 )
-from seal_friction_ros.core.estimation.records import NEVER
 from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.foundation.limits import between
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.parameters import check, parameter
 from seal_friction_ros.core.friction.actuator import ActuatorFriction
+from seal_friction_ros.core.messages.records import NEVER
 
 MODES = ('off', 'observe', 'on')
 

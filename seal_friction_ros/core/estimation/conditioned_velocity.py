@@ -20,9 +20,9 @@ Source: play operator, [Visintin1994]_; learning and all numbers are our choice.
 
 from typing import NamedTuple
 
-from seal_friction_ros.core.estimation.records import NEVER
 from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.foundation.limits import between
+from seal_friction_ros.core.messages.records import NEVER
 
 LONGEST_STEP = 0.02  # [s] a longer time between two samples counts as this one
 LONGEST_SMOOTHING = 0.02  # [s]

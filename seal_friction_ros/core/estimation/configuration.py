@@ -15,12 +15,12 @@ from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.estimator import DEFAULT_ADAPTATION, EstimatorParameters, EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, init
-from seal_friction_ros.core.estimation.records import Force, Pressure, field_names, numbers_in
 from seal_friction_ros.core.foundation.documents import parse_json
 from seal_friction_ros.core.foundation.parameters import check, from_mapping, meanings, parameter
 from seal_friction_ros.core.friction.actuator import MountedSeal
 from seal_friction_ros.core.friction.mounting import CHAMBERS_TEXT, check_chambers
 from seal_friction_ros.core.friction.seal_file import mount_seals, mounting_of
+from seal_friction_ros.core.messages.records import Force, Pressure, field_names, numbers_in
 
 PLACEHOLDER = 'placeholder'
 """Seal file of the default configuration."""

@@ -35,18 +35,7 @@ from seal_friction_ros.core.estimation.conditioned_velocity import (
     condition_velocity,
 )
 from seal_friction_ros.core.estimation.hidden_motion import NO_HIDDEN_MOTION, Apparent, HiddenMotion, with_sample
-from seal_friction_ros.core.estimation.records import (
-    BITS,
-    EXTRAPOLATED,
-    NEVER,
-    NO_FORCE,
-    NO_PRESSURE,
-    Force,
-    FrictionEstimate,
-    Pressure,
-    RodSample,
-    SealTemperature,
-)
+from seal_friction_ros.core.estimation.records import RodSample, SealTemperature
 from seal_friction_ros.core.estimation.sheared_seals import (
     NOT_FOLLOWED,
     FollowedElasticity,
@@ -90,6 +79,16 @@ from seal_friction_ros.core.friction.temperature import (
     TemperatureScale,
     is_identified_at,
     one_temperature_scale,
+)
+from seal_friction_ros.core.messages.records import (
+    BITS,
+    EXTRAPOLATED,
+    NEVER,
+    NO_FORCE,
+    NO_PRESSURE,
+    Force,
+    FrictionEstimate,
+    Pressure,
 )
 
 

@@ -35,10 +35,8 @@ Source: [Armstrong1994]_ (feed-forward from the desired velocity); fade, slew an
 
 import math
 from dataclasses import dataclass
-from enum import IntFlag
 from typing import NamedTuple
 
-from seal_friction_ros.core.estimation.records import NEVER, FrictionEstimate, Status
 from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.foundation.limits import between
 from seal_friction_ros.core.foundation.parameters import check, parameter
@@ -49,17 +47,10 @@ from seal_friction_ros.core.friction.presliding import (
     element_forces,
 )
 from seal_friction_ros.core.friction.states import UNKNOWN
+from seal_friction_ros.core.messages.records import NEVER, FeedForward, FrictionEstimate, Limited, Status
 
 FASTEST = 100.0  # [m/s] no rod is faster
 LONGEST_STEP = 0.02  # [s] after a longer gap the force changes, and fades in, as if this time had passed
-
-
-class Limited(IntFlag):
-    """What limited the force; 0 means nothing. The meanings are written in FrictionFeedForward.msg."""
-
-    SLEW = 1
-    CLAMP = 2
-    FADE = 4
 
 
 _SLEW, _CLAMP, _FADE = int(Limited.SLEW), int(Limited.CLAMP), int(Limited.FADE)
@@ -154,15 +145,6 @@ class FeedForwardState(NamedTuple):
     velocity: float  # [m/s] last usable wanted velocity
     elements: Elements = NO_ELEMENTS  # [N] forces of the sheared seals after the wanted displacement
     led_velocity: float = 0.0  # [m/s] last usable wanted velocity ``lead_time`` ahead, beyond a reversal too
-
-
-class FeedForward(NamedTuple):
-    """Compensation at one moment. Every number is finite, whatever came in."""
-
-    stamp: int  # [ns]
-    force: float  # [N] positive on extension
-    scale: float  # [-] share of the estimated friction that is compensated
-    limited: int  # bits of `Limited`
 
 
 FADED_OUT = FeedForwardState(NEVER, 0.0, 0.0, -1.0, 0.0, NO_ELEMENTS, 0.0)

@@ -13,8 +13,8 @@ Source: [Page1954]_; numbers are our choice.
 import math
 from typing import NamedTuple
 
-from seal_friction_ros.core.estimation.records import NEVER
 from seal_friction_ros.core.foundation.limits import between
+from seal_friction_ros.core.messages.records import NEVER
 
 REFERENCE_REVERSALS = 20
 LEAST_STD = 0.02  # [-]

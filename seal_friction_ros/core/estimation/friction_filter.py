@@ -35,9 +35,9 @@ and the numbers are our choice.
 import math
 from typing import NamedTuple
 
-from seal_friction_ros.core.estimation.records import NEVER
 from seal_friction_ros.core.foundation.compiled import compilable, replace
 from seal_friction_ros.core.foundation.limits import between
+from seal_friction_ros.core.messages.records import NEVER
 
 # Prior: one standard deviation. A share is one of the friction by the law at the first sample.
 SCALE_PRIOR = 0.3  # [-] of another day, beside the deviation of the seal file

@@ -57,28 +57,28 @@ from seal_friction_ros.core.estimation.feedforward import (
     usable,
     wanted_velocity,
 )
-from seal_friction_ros.core.estimation.messages import Input, Output, encode, type_of
-from seal_friction_ros.core.estimation.records import (
-    NEVER,
-    NO_FORCE,
-    NO_PRESSURE,
-    NO_TEMPERATURE,
-    Clock,
-    Force,
-    Position,
-    Pressure,
-    RodSample,
-    SealTemperature,
-    ServoReference,
-    Temperature,
-    Velocity,
-    WatchdogTick,
-)
+from seal_friction_ros.core.estimation.records import NO_TEMPERATURE, RodSample, SealTemperature
 from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.foundation.limits import between
 from seal_friction_ros.core.foundation.units import ZEROS
 from seal_friction_ros.core.friction.actuator import at_temperature, friction_of_seals
 from seal_friction_ros.core.friction.temperature import COLDEST, HOTTEST
+from seal_friction_ros.core.messages.coder import encode, type_of
+from seal_friction_ros.core.messages.records import (
+    NEVER,
+    NO_FORCE,
+    NO_PRESSURE,
+    Clock,
+    Force,
+    Input,
+    Output,
+    Position,
+    Pressure,
+    ServoReference,
+    Temperature,
+    Velocity,
+    WatchdogTick,
+)
 
 ACCELERATION_SMOOTHING = 4.0  # [-] of the time constant of the velocity; our choice
 ZERO_CELSIUS = ZEROS['degC']  # [K]

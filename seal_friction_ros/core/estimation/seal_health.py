@@ -7,8 +7,8 @@ from seal_friction_ros.core.estimation.adaptation import AdaptationState, learnt
 from seal_friction_ros.core.estimation.disagreement import Reversal, input_fault, likely_reason, reversal_between
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorState
 from seal_friction_ros.core.estimation.friction_change import REFERENCE_REVERSALS, FrictionChange, watch
-from seal_friction_ros.core.estimation.records import NEVER, FrictionEstimate, Status
 from seal_friction_ros.core.friction.states import SLIDING
+from seal_friction_ros.core.messages.records import NEVER, FrictionEstimate, Status
 
 KEPT_REVERSALS = 60  # for the likely reason
 FEWEST_OF_REFERENCE = 5  # reversals (our choice): a mean of fewer says little

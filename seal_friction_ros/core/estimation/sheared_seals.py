@@ -25,7 +25,6 @@ Source: the elements are those of `presliding`; all else is our choice.
 import math
 from typing import NamedTuple
 
-from seal_friction_ros.core.estimation.records import NEVER
 from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.foundation.limits import between
 from seal_friction_ros.core.friction.presliding import (
@@ -40,6 +39,7 @@ from seal_friction_ros.core.friction.presliding import (
     relaxed,
     shear,
 )
+from seal_friction_ros.core.messages.records import NEVER
 
 REST = 100_000_000  # [ns] after which a rod at rest does not accelerate
 SHORT_GAP = 0.01  # [s] over which the way is that of the velocities at both ends,

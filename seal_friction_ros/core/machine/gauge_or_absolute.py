@@ -6,7 +6,6 @@ A chamber without load is at ambient pressure: 0 Pa gauge, about 1e5 Pa absolute
 import math
 from typing import NamedTuple
 
-from seal_friction_ros.core.estimation.records import NEVER, Pressure
 from seal_friction_ros.core.machine.machine_file import (
     FLUID_PRESSURE,
     STANDARD_ATMOSPHERE,
@@ -14,6 +13,7 @@ from seal_friction_ros.core.machine.machine_file import (
     MachineFile,
     Signal,
 )
+from seal_friction_ros.core.messages.records import NEVER, Pressure
 
 LOWEST_GAUGE = -5e4  # [Pa] only a chamber that cavitates is nearer to vacuum
 LOWEST_IN_KPA = 80.0  # in a message: an absolute pressure in kPa is not below it

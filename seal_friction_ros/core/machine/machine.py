@@ -25,20 +25,23 @@ from typing import Any, NamedTuple
 from seal_friction_ros.core.estimation import pipeline
 from seal_friction_ros.core.estimation.configuration import Configuration
 from seal_friction_ros.core.estimation.feedforward import newest_force
-from seal_friction_ros.core.estimation.messages import DECODERS, Input, Output
 from seal_friction_ros.core.estimation.pipeline import ZERO_CELSIUS, PipelineParameters, PipelineState
-from seal_friction_ros.core.estimation.records import (
+from seal_friction_ros.core.machine.differentiator import NO_WINDOW, Differentiator, Window, differentiate
+from seal_friction_ros.core.machine.machine_file import Actuator, ForceSum, LoadTable, MachineFile, Signal
+from seal_friction_ros.core.messages.coder import DECODERS
+from seal_friction_ros.core.messages.definitions import Definition
+from seal_friction_ros.core.messages.fields import Reader
+from seal_friction_ros.core.messages.records import (
     NEVER,
     Force,
+    Input,
+    Output,
     Position,
     Pressure,
     ServoReference,
     Temperature,
     Velocity,
 )
-from seal_friction_ros.core.machine.differentiator import NO_WINDOW, Differentiator, Window, differentiate
-from seal_friction_ros.core.machine.machine_file import Actuator, ForceSum, LoadTable, MachineFile, Signal
-from seal_friction_ros.core.machine.message_fields import Definition, Reader
 
 GRAVITY = 9.80665  # [m/s^2] standard acceleration, ISO 80000-3
 AMBIENT_TIMEOUT = 60.0  # [s] our choice: the weather changes the ambient pressure by less than 1 hPa in a minute

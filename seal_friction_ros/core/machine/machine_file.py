@@ -46,12 +46,12 @@ from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
-from seal_friction_ros.core.estimation.messages import INPUTS as OWN_TOPICS
 from seal_friction_ros.core.estimation.node_options import ADAPTATION_PREFIX, FEEDFORWARD_PREFIX
 from seal_friction_ros.core.foundation.parameters import ParameterGroup, check_names, from_mapping, printable
 from seal_friction_ros.core.foundation.units import QUANTITIES, ZEROS, in_si, unit_meant
 from seal_friction_ros.core.machine.differentiator import Differentiator, chosen_differentiator
-from seal_friction_ros.core.machine.message_fields import short_name
+from seal_friction_ros.core.messages.definitions import short_name
+from seal_friction_ros.core.messages.layouts import INPUTS as OWN_TOPICS
 
 FLUID_PRESSURE = 'sensor_msgs/FluidPressure'  # absolute by its definition
 TEMPERATURE = 'sensor_msgs/Temperature'  # in degC by its definition

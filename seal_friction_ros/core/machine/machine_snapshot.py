@@ -31,7 +31,7 @@ from seal_friction_ros.core.machine.machine import (
     parse_memory,
 )
 from seal_friction_ros.core.machine.machine_file import MachineFile, own_file, parse_machine
-from seal_friction_ros.core.machine.message_fields import Definition
+from seal_friction_ros.core.messages.definitions import Definition
 
 _WHERE = 'configuration: machine'
 

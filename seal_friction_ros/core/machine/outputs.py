@@ -1,4 +1,4 @@
-"""The feed-forward as the message that a controller takes, as bytes (CDR, little endian, padding zero).
+"""The feed-forward as the message that a controller takes, as bytes.
 
 Beside the message of this project, a command goes out as
 
@@ -11,15 +11,16 @@ take a position, a velocity or a valve command. A command is 0 exactly where the
 """
 
 import math
-import struct
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from seal_friction_ros.core.estimation.messages import SECOND
 from seal_friction_ros.core.machine.machine import Machine, MachineState
 from seal_friction_ros.core.machine.machine_file import MachineFile, Output
+from seal_friction_ros.core.messages.coder import encode_efforts, encode_number, encode_numbers
+from seal_friction_ros.core.messages.definitions import short_name
+from seal_friction_ros.core.messages.layouts import NUMBER_TYPE, NUMBERS_TYPE
 
-_ENCAPSULATION = b'\x00\x01\x00\x00'  # CDR, little endian, no options
+_NUMBER, _NUMBERS = short_name(NUMBER_TYPE), short_name(NUMBERS_TYPE)
 
 
 class Command(NamedTuple):
@@ -91,32 +92,11 @@ def check_outputs(file: MachineFile) -> None:
 
 def _encoded(parts: list[tuple[Output, float]], stamp: int) -> bytes:
     kind = parts[0][0].type_name
-    if kind == 'std_msgs/Float64':
-        return struct.pack('<4sd', _ENCAPSULATION, parts[0][1])
-    if kind == 'std_msgs/Float64MultiArray':
+    if kind == _NUMBER:
+        return encode_number(parts[0][1])
+    if kind == _NUMBERS:
         values = [0.0] * (1 + max(output.index for output, _ in parts))
         for output, command in parts:
             values[output.index] = command
-        # no dimensions, data_offset 0, then the data; the first number is aligned to 8
-        return struct.pack(f'<4sIII4x{len(values)}d', _ENCAPSULATION, 0, 0, len(values), *values)
-    return _joint_state(parts, stamp)
-
-
-def _joint_state(parts: list[tuple[Output, float]], stamp: int) -> bytes:
-    seconds, nanoseconds = divmod(stamp, SECOND)
-    body = bytearray(struct.pack('<iIIB', seconds, nanoseconds, 1, 0))  # an empty frame name has its end
-    _align(body, 4)
-    body += struct.pack('<I', len(parts))
-    for output, _ in parts:
-        name = output.joint.encode() + b'\x00'
-        _align(body, 4)
-        body += struct.pack('<I', len(name)) + name
-    _align(body, 4)
-    body += struct.pack('<III', 0, 0, len(parts))  # no positions, no velocities
-    _align(body, 8)
-    body += struct.pack(f'<{len(parts)}d', *(command for _, command in parts))
-    return _ENCAPSULATION + bytes(body)
-
-
-def _align(body: bytearray, size: int) -> None:
-    body += bytes(-len(body) % size)
+        return encode_numbers(values)
+    return encode_efforts(stamp, [(output.joint, command) for output, command in parts])

@@ -6,8 +6,8 @@ Source: the format of policies, version 0.2.0, of the SROS 2 design (design.ros2
 from collections.abc import Iterable
 from xml.sax.saxutils import escape
 
-from seal_friction_ros.core.estimation.messages import OUTPUTS
 from seal_friction_ros.core.machine.machine_file import MachineFile
+from seal_friction_ros.core.messages.layouts import OUTPUTS
 
 _CLOCK = '/clock'  # where use_sim_time is set
 _OWN_TOPICS = (

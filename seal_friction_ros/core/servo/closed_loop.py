@@ -17,12 +17,19 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.estimation import pipeline
-from seal_friction_ros.core.estimation.feedforward import FeedForward, FeedForwardSettings
-from seal_friction_ros.core.estimation.messages import Input, Output
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters
-from seal_friction_ros.core.estimation.records import Force, Pressure, ServoReference, Velocity
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.friction.force_sum_correction import measured_force_sum
+from seal_friction_ros.core.messages.records import (
+    FeedForward,
+    Force,
+    Input,
+    Output,
+    Pressure,
+    ServoReference,
+    Velocity,
+)
 from seal_friction_ros.core.servo import position_servo as servo
 from seal_friction_ros.core.servo.controller import Measurement
 from seal_friction_ros.core.servo.cylinder import pressure_force

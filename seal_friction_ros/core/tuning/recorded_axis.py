@@ -27,9 +27,9 @@ from seal_friction_ros.core.estimation.feedforward import (
     usable,
     wanted_velocity,
 )
-from seal_friction_ros.core.estimation.records import NO_ESTIMATE, Status
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages.records import NO_ESTIMATE, Status
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, RobustnessCase, TunedFeedForward
 from seal_friction_ros.core.tuning.simulated_axis import bounded, force_limit, nearest_preferred, preferred
 

@@ -12,12 +12,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from seal_friction_ros.core.estimation import messages as m
 from seal_friction_ros.core.estimation.configuration import Recorded, snapshot_text
-from seal_friction_ros.core.estimation.message_blocks import Messages
-from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, decode_together
 from seal_friction_ros.core.machine.machine import QUANTITIES, Machine, MachineActuator, MachineState
 from seal_friction_ros.core.machine.machine_snapshot import MachineSnapshot, machine_of, parse_machine_text
+from seal_friction_ros.core.messages import coder, layouts
+from seal_friction_ros.core.messages.blocks import Messages
+from seal_friction_ros.core.messages.layouts import MACHINE_TYPE
+from seal_friction_ros.core.messages.together import decode_together
 from seal_friction_ros.offline.bags.bag import (
     CONFIGURATION_TOPIC,
     ESTIMATE_TOPIC,
@@ -44,9 +45,9 @@ from seal_friction_ros.offline.bags.mapped_bag import (
     machine_messages,
 )
 
-_OWN = {m.ESTIMATE_TYPE: 'estimate', m.FEEDFORWARD_TYPE: 'feedforward', m.TICK_TYPE: 'tick'}
+_OWN = {layouts.ESTIMATE_TYPE: 'estimate', layouts.FEEDFORWARD_TYPE: 'feedforward', layouts.TICK_TYPE: 'tick'}
 """Message type that the node of a machine makes for each actuator -> field of `Topics`."""
-ANSWER_TOPICS = {m.ESTIMATE_TYPE: ESTIMATE_TOPIC, m.FEEDFORWARD_TYPE: FEEDFORWARD_TOPIC}
+ANSWER_TOPICS = {layouts.ESTIMATE_TYPE: ESTIMATE_TOPIC, layouts.FEEDFORWARD_TYPE: FEEDFORWARD_TOPIC}
 """Message type of an answer -> topic, if the bag has no topic of that type."""
 
 RECORDED = '_recorded'
@@ -77,7 +78,7 @@ class Topics(NamedTuple):
     @property
     def answers(self) -> dict[str, str]:
         """Message type of an answer -> its topic; empty if there is no such topic."""
-        return {m.ESTIMATE_TYPE: self.estimate, m.FEEDFORWARD_TYPE: self.feedforward}
+        return {layouts.ESTIMATE_TYPE: self.estimate, layouts.FEEDFORWARD_TYPE: self.feedforward}
 
     @property
     def state(self) -> str:
@@ -86,17 +87,17 @@ class Topics(NamedTuple):
 
 
 TYPES = Topics(
-    pressure=m.PRESSURE_TYPE,
-    velocity=m.VELOCITY_TYPE,
-    force=m.FORCE_TYPE,
-    reference=m.REFERENCE_TYPE,
-    position=m.POSITION_TYPE,
-    estimate=m.ESTIMATE_TYPE,
-    feedforward=m.FEEDFORWARD_TYPE,
-    configuration=m.CONFIGURATION_TYPE,
-    tick=m.TICK_TYPE,
-    temperature=m.TEMPERATURE_TYPE,
-    clock=m.CLOCK_TYPE,
+    pressure=layouts.PRESSURE_TYPE,
+    velocity=layouts.VELOCITY_TYPE,
+    force=layouts.FORCE_TYPE,
+    reference=layouts.REFERENCE_TYPE,
+    position=layouts.POSITION_TYPE,
+    estimate=layouts.ESTIMATE_TYPE,
+    feedforward=layouts.FEEDFORWARD_TYPE,
+    configuration=layouts.CONFIGURATION_TYPE,
+    tick=layouts.TICK_TYPE,
+    temperature=layouts.TEMPERATURE_TYPE,
+    clock=layouts.CLOCK_TYPE,
 )
 """Message type of each topic."""
 
@@ -253,12 +254,12 @@ def recorded_machine(bag: Path, infos: Mapping[str, TopicInfo]) -> MachineSnapsh
         BagError: The bag, or its configuration, cannot be read.
     """
     present = {info.type_name for info in infos.values() if info.message_count}
-    if m.CONFIGURATION_TYPE not in present:
+    if layouts.CONFIGURATION_TYPE not in present:
         return None
     try:
         first = first_snapshot(bag, read_messages(bag))
     except BagError:
-        if m.VELOCITY_TYPE in present:  # a bag with a configuration that cannot be read is still worth a report
+        if layouts.VELOCITY_TYPE in present:  # a bag with a configuration that cannot be read is still worth a report
             return None
         raise
     return None if first is None or first.file.document is None else first
@@ -270,12 +271,12 @@ def first_snapshot(bag: Path, messages: Iterable[BagMessage], topic: str = '') -
     Raises:
         BagError: It cannot be read.
     """
-    found = (one for one in messages if one.type_name == m.CONFIGURATION_TYPE and topic in ('', one.topic))
+    found = (one for one in messages if one.type_name == layouts.CONFIGURATION_TYPE and topic in ('', one.topic))
     first = next(found, None)
     if first is None:
         return None
     with named(bag, first):
-        return parse_machine_text(m.decode_text(first.data))
+        return parse_machine_text(coder.decode_text(first.data))
 
 
 def _machine_of(bag: Path, snapshot: MachineSnapshot) -> tuple[Machine, MachineState]:
@@ -327,7 +328,7 @@ def _topics_of(actuator: MachineActuator, infos: Mapping[str, TopicInfo], *, has
         name: f'/{actuator.name}/{LAST_PART[kind]}' if name in made else ''
         for name, kind in zip(TYPES._fields, TYPES, strict=True)
     }
-    clocks = [topic for topic, kind in present.items() if kind == m.CLOCK_TYPE and not has_mapping]
+    clocks = [topic for topic, kind in present.items() if kind == layouts.CLOCK_TYPE and not has_mapping]
     return Topics(**{**names, 'clock': clocks[0] if clocks else ''})
 
 
@@ -366,7 +367,7 @@ class _OfActuator:
 
     def _taken(self, message: BagMessage) -> Iterable[BagMessage]:
         kind, translation = message.type_name, self._translation
-        if kind == m.CONFIGURATION_TYPE:
+        if kind == layouts.CONFIGURATION_TYPE:
             return [self._configured(message)]
         if translation is None:
             return []
@@ -378,31 +379,31 @@ class _OfActuator:
             return self._encoded(
                 message, [(record, frame_id) for name, record, frame_id in answers if name == self._name]
             )
-        if kind == m.CLOCK_TYPE:
-            translation.follow(m.decode_clock(message.data), message.log_time)
+        if kind == layouts.CLOCK_TYPE:
+            translation.follow(coder.decode_clock(message.data), message.log_time)
             return [message]
         if kind in _OWN and _is_of(self._name, message.topic):
             return [message._replace(topic=f'/{self._name}/{message.topic.rpartition("/")[2]}')]
-        return [] if kind in m.DECODERS else [message]
+        return [] if kind in coder.DECODERS else [message]
 
     def _configured(self, message: BagMessage) -> BagMessage:
         """Take a configuration of the machine; that of the actuator."""
-        known = parse_machine_text(m.decode_text(message.data))
+        known = parse_machine_text(coder.decode_text(message.data))
         if self._name not in known.actuators:
             raise ValueError(f'no {self._name} in the configuration: {", ".join(known.actuators)}')
         self._translation = Translation(*_machine_of(self._bag, known), self._name)
         snapshot = known.actuators[self._name].snapshot
         if self._did_not_act:
             snapshot = snapshot._replace(recorded=Recorded(None))
-        return message._replace(topic=self._topics.configuration, data=m.encode_text(snapshot_text(snapshot)))
+        return message._replace(topic=self._topics.configuration, data=coder.encode_text(snapshot_text(snapshot)))
 
     def _encoded(self, message: BagMessage, made: Iterable[tuple[Any, bytes]]) -> Iterator[BagMessage]:
         """Records as messages of the actuator."""
         for record, frame_id in made:
-            kind = m.type_of(record)
-            self._has_velocity |= kind == m.VELOCITY_TYPE
+            kind = coder.type_of(record)
+            self._has_velocity |= kind == layouts.VELOCITY_TYPE
             topic = f'/{self._name}/{LAST_PART[kind]}'
-            yield message._replace(topic=topic, type_name=kind, data=m.encode(record, frame_id))
+            yield message._replace(topic=topic, type_name=kind, data=coder.encode(record, frame_id))
 
 
 def no_velocity(bag: Path, actuator: str, reasons: Sequence[str] = ()) -> str:
@@ -439,7 +440,7 @@ def source_of(bag: Path | ActuatorBag, namespace: str) -> Source:
     read: Callable[[], Iterator[BagMessage]]
     if isinstance(bag, Path):
         path, infos, read = bag, bag_topics(bag), partial(read_messages, bag)
-        configuration = find_topic(bag, m.CONFIGURATION_TYPE, namespace, infos)
+        configuration = find_topic(bag, layouts.CONFIGURATION_TYPE, namespace, infos)
         machine = recorded_machine(bag, infos) if namespace and not configuration else None
         if machine is not None:
             return source_of(actuator_of(bag, infos, machine, namespace), '')

@@ -22,9 +22,11 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 import yaml
 
-from seal_friction_ros.core.estimation.message_blocks import MOST_MESSAGES, Messages
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS
-from seal_friction_ros.core.machine.message_fields import Definition, full_name, parse_definition, short_name
+from seal_friction_ros.core.messages.blocks import MOST_MESSAGES, Messages
+from seal_friction_ros.core.messages.cdr import ENCODING
+from seal_friction_ros.core.messages.coder import DECODERS
+from seal_friction_ros.core.messages.definitions import Definition, full_name, parse_definition, short_name
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE
 from seal_friction_ros.files import parse_yaml, read_yaml
 from seal_friction_ros.offline.bags import mcap_reader, sqlite_reader
 from seal_friction_ros.offline.bags.definitions import known_definition, message_definition
@@ -165,7 +167,7 @@ class BagWriter:
             topic: Its topic.
             type_name: Its type.
             log_time: [ns]
-            data: CDR.
+            data: Its bytes.
             publish_time: [ns] on any clock; default: the recorded log time.
             description: Of the topic; optional if the type is installed.
 
@@ -339,7 +341,7 @@ def _topic_metadata(topic: str, description: Description) -> dict[str, Any]:
     return {
         'name': topic,
         'type': description.type_name,
-        'serialization_format': 'cdr',
+        'serialization_format': ENCODING,
         'offered_qos_profiles': _parsed(description.metadata['offered_qos_profiles']),
         'type_description_hash': description.metadata['topic_type_hash'],
     }

@@ -13,8 +13,9 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 from mcap.opcode import Opcode
 
-from seal_friction_ros.core.estimation.message_blocks import MOST_MESSAGES, Bytes, Integers, Messages
 from seal_friction_ros.core.foundation.compiled import compiled
+from seal_friction_ros.core.messages.blocks import MOST_MESSAGES, Bytes, Integers, Messages
+from seal_friction_ros.core.messages.compiled_coder import integer_at
 from seal_friction_ros.offline.bags import mcap_reader
 from seal_friction_ros.offline.bags.bag import KindOf, gathered, read_messages, storage
 from seal_friction_ros.offline.bags.mcap_reader import HEAD, LAST_TIME, MESSAGE_HEAD, Block, Layout, Names
@@ -133,15 +134,6 @@ def _located(data: bytes, block: Block, names: Names) -> Integers:
 
 
 @compiled
-def _whole_number(data: Bytes, offset: int) -> int:
-    """Eight bytes, little endian; negative from 2^63 on."""
-    value = np.int64(0)
-    for i in range(8):
-        value |= np.int64(data[offset + i]) << np.int64(8 * i)
-    return int(value)
-
-
-@compiled
 def _walk(
     data: Bytes, rows: Integers, count: int, offset: int, first: int, last: int, known: Bytes
 ) -> tuple[int, int, int]:
@@ -151,7 +143,7 @@ def _walk(
         Offset reached, number of messages, and opcode of the record there: 0 at the end, -1 if it is invalid.
     """
     while offset + HEAD <= len(data):
-        opcode, end = data[offset], offset + HEAD + _whole_number(data, offset + 1)
+        opcode, end = data[offset], offset + HEAD + integer_at(data, offset + 1, 8)
         if not offset + HEAD <= end <= len(data):
             break
         if _SCHEMA <= opcode <= _CHANNEL:
@@ -159,10 +151,10 @@ def _walk(
         if opcode == _MESSAGE:
             begin = offset + MESSAGE_HEAD
             channel = data[offset + 9] | np.int64(data[offset + 10]) << 8
-            if begin > end or not known[channel] or not first <= _whole_number(data, offset + 15) <= last:
+            if begin > end or not known[channel] or not first <= integer_at(data, offset + 15, 8) <= last:
                 break
             rows[0, count], rows[1, count], rows[2, count] = channel, begin, end - begin
-            rows[3, count], rows[4, count] = _whole_number(data, offset + 15), _whole_number(data, offset + 23)
+            rows[3, count], rows[4, count] = integer_at(data, offset + 15, 8), integer_at(data, offset + 23, 8)
             count += 1
         offset = end
     return offset, count, 0 if offset == len(data) else -1

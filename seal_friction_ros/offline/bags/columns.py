@@ -8,16 +8,15 @@ import math
 from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
 from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
-from seal_friction_ros.core.estimation.message_blocks import Messages, UnsuitedError
-from seal_friction_ros.core.estimation.messages import LAYOUTS, LONGEST_FRAME, SECOND, decode, decode_text
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.foundation.compiled import has_compiler
-from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages.blocks import Messages, Numbers, UnsuitedError, numbers_of
+from seal_friction_ros.core.messages.coder import decode_text
 from seal_friction_ros.offline.bags.actuator_bag import TYPES, ActuatorBag
 from seal_friction_ros.offline.bags.bag import BagError, BagMessage, gathered
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS
@@ -25,10 +24,6 @@ from seal_friction_ros.offline.work.progress import progress
 
 BULK_FROM = 300_000
 """Bags of at least so many messages are read in bulk: loading the compiler takes as long as reading them one by one."""
-
-_LAYOUTS = {layout.message_type: layout for layout in LAYOUTS}
-_DTYPES: dict[str, np.dtype[Any]] = dict(zip('dIBb', map(np.dtype, ('<f8', '<u4', 'u1', 'i1')), strict=True))
-_HEAD = 16  # [bytes] encapsulation, stamp, length of the frame name
 
 
 _Decoded = TypeVar('_Decoded')
@@ -39,14 +34,6 @@ class Wanted(NamedTuple):
 
     topic: str
     type_name: str
-
-
-class Numbers(NamedTuple):
-    """The messages of one kind in a block, n of them."""
-
-    places: IntArray  # numbers in the block
-    stamps: IntArray  # [ns]
-    numbers: FloatArray  # shape (fields, n)
 
 
 class Block:
@@ -143,49 +130,6 @@ def collected(
         raise
     except (UnsuitedError, ValueError) as error:
         raise BagError(f'{bag.path}: {error}') from None
-
-
-def numbers_of(messages: Messages, kind: int, type_name: str, topic: str = '') -> Numbers:
-    """Numbers of all messages of a kind.
-
-    Args:
-        messages: Of several kinds.
-        kind: Of those that are wanted.
-        type_name: Their type, one of `LAYOUTS`.
-        topic: For errors.
-
-    Raises:
-        ValueError: One is malformed; names its topic and time.
-    """
-    layout = _LAYOUTS[type_name]
-    places = np.flatnonzero(messages.kinds == kind)
-    offsets, sizes, data = messages.offsets[places], messages.sizes[places], messages.data
-    data = data if len(data) >= _HEAD else np.zeros(_HEAD, np.uint8)  # then every message is malformed
-    stamps, numbers = np.zeros(len(places), np.int64), np.zeros((len(layout.codes), len(places)))
-    is_usual = sizes >= _HEAD
-    head = data[np.where(is_usual, offsets, 0)[:, np.newaxis] + np.arange(_HEAD)]
-    words = head.view('<u4').astype(np.int64)
-    nanoseconds, length = words[:, 2], words[:, 3]
-    begin = 4 + (12 + length + 7) // 8 * 8  # as `messages.head_size`
-    spare = sizes - begin - layout.size
-    is_usual &= (words[:, 0] & 0xFFFF == 0x0100) & (nanoseconds < SECOND) & (length <= LONGEST_FRAME)
-    is_usual &= (spare >= 0) & (spare <= 3)
-    usual = slice(None) if is_usual.all() else is_usual
-    stamps[usual] = (head.view('<i4')[:, 1].astype(np.int64) * SECOND + nanoseconds)[usual]
-    starts = (offsets + begin)[usual, np.newaxis]
-    for row, code, at in zip(numbers, layout.codes, layout.offsets, strict=True):
-        kept = _DTYPES[code]
-        row[usual] = data[starts + (at + np.arange(kept.itemsize))].view(kept)[:, 0]
-    if 'state' in layout.fields:
-        is_usual &= np.isin(numbers[layout.fields.index('state')], list(FrictionState))
-    for number in np.flatnonzero(~is_usual).tolist():  # of an older layout, or malformed
-        place = int(places[number])
-        try:
-            stamps[number], *values = decode(type_name, messages.message(place))
-        except ValueError as error:
-            raise ValueError(f'message on {topic} at {messages.received[place]} ns: {error}') from None
-        numbers[:, number] = values[: len(numbers)]
-    return Numbers(places, stamps, numbers)
 
 
 class Held:

@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from seal_friction_ros.core.estimation.messages import PACKAGE
+from seal_friction_ros.core.messages.layouts import PACKAGE
 from seal_friction_ros.files import share_directory
 from seal_friction_ros.packages import needed
 

@@ -14,21 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.estimation.configuration import Snapshot, snapshot_text
-from seal_friction_ros.core.estimation.messages import (
-    CONFIGURATION_TYPE,
-    FORCE_TYPE,
-    INPUTS,
-    PRESSURE_TYPE,
-    VELOCITY_TYPE,
-    Input,
-    encode,
-    encode_text,
-    type_of,
-)
-from seal_friction_ros.core.estimation.records import Position, Pressure, ServoReference
 from seal_friction_ros.core.foundation.stamps import StampRepair
 from seal_friction_ros.core.machine.gauge_or_absolute import Lowest, pressure_remarks
 from seal_friction_ros.core.machine.machine import Machine, MachineActuator, MachineState
+from seal_friction_ros.core.messages.coder import encode, encode_text, type_of
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, FORCE_TYPE, INPUTS, PRESSURE_TYPE, VELOCITY_TYPE
+from seal_friction_ros.core.messages.records import Input, Position, Pressure, ServoReference
 from seal_friction_ros.offline.bags.actuator_bag import no_velocity, sources_of
 from seal_friction_ros.offline.bags.bag import (
     CONFIGURATION_TOPIC,

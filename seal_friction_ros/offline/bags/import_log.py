@@ -12,20 +12,20 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seal_friction_ros.core.estimation.messages import (
+from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.units import ZEROS, unit_size
+from seal_friction_ros.core.identification.signal_preparation import slope
+from seal_friction_ros.core.machine.gauge_or_absolute import HIGHEST_AMBIENT, LOWEST_ABSOLUTE
+from seal_friction_ros.core.messages.coder import encode
+from seal_friction_ros.core.messages.layouts import (
     FORCE_TYPE,
     POSITION_TYPE,
     PRESSURE_TYPE,
     REFERENCE_TYPE,
     TEMPERATURE_TYPE,
     VELOCITY_TYPE,
-    encode,
 )
-from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Temperature, Velocity
-from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.units import ZEROS, unit_size
-from seal_friction_ros.core.identification.signal_preparation import slope
-from seal_friction_ros.core.machine.gauge_or_absolute import HIGHEST_AMBIENT, LOWEST_ABSOLUTE
+from seal_friction_ros.core.messages.records import Force, Position, Pressure, ServoReference, Temperature, Velocity
 from seal_friction_ros.offline.bags.bag import (
     FORCE_TOPIC,
     POSITION_TOPIC,

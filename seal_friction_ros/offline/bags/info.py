@@ -5,13 +5,15 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, ESTIMATE_TYPE, decode, decode_text
-from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
 from seal_friction_ros.core.foundation.stamps import StampRepair
 from seal_friction_ros.core.friction.states import FrictionState
-from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, decode_together
 from seal_friction_ros.core.machine.machine_snapshot import parse_machine_text
-from seal_friction_ros.core.machine.message_fields import Reader, short_name
+from seal_friction_ros.core.messages.coder import decode, decode_text
+from seal_friction_ros.core.messages.definitions import short_name
+from seal_friction_ros.core.messages.fields import Reader
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, ESTIMATE_TYPE, MACHINE_TYPE
+from seal_friction_ros.core.messages.records import FrictionEstimate, Status
+from seal_friction_ros.core.messages.together import decode_together
 from seal_friction_ros.offline.bags.bag import BagError, BagMessage, bag_topics, named, read_definitions
 from seal_friction_ros.offline.bags.mapped_bag import MappingFile, machine_messages
 

@@ -6,10 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from seal_friction_ros.core.estimation import messages as m
 from seal_friction_ros.core.estimation.configuration import Configuration
-from seal_friction_ros.core.estimation.records import Clock
-from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE
 from seal_friction_ros.core.machine.machine import (
     Machine,
     MachineState,
@@ -21,13 +18,21 @@ from seal_friction_ros.core.machine.machine import (
 )
 from seal_friction_ros.core.machine.machine_file import MachineFile, parse_machine
 from seal_friction_ros.core.machine.machine_snapshot import machine_text, snapshot_of
-from seal_friction_ros.core.machine.message_fields import short_name
+from seal_friction_ros.core.messages import coder, layouts, records
+from seal_friction_ros.core.messages.definitions import short_name
+from seal_friction_ros.core.messages.layouts import MACHINE_TYPE
+from seal_friction_ros.core.messages.records import Clock
 from seal_friction_ros.files import machine_configurations, read_machine
 from seal_friction_ros.offline.bags.bag import BagMessage, TopicInfo, bag_topics, named, read_definitions, read_messages
 
 MACHINE_CONFIGURATION = '/machine_estimator/configuration'
 LARGEST_CLOCK_STEP = 1_000_000_000  # [ns] stamps further from the log time are of another clock; our choice
-_LAST_PARTS = {**m.INPUTS, **m.OUTPUTS, 'watchdog_tick': m.TICK_TYPE, 'configuration': m.CONFIGURATION_TYPE}
+_LAST_PARTS = {
+    **layouts.INPUTS,
+    **layouts.OUTPUTS,
+    'watchdog_tick': layouts.TICK_TYPE,
+    'configuration': layouts.CONFIGURATION_TYPE,
+}
 LAST_PART = {kind: topic for topic, kind in _LAST_PARTS.items()}
 """message type -> last part of its topic"""
 
@@ -111,14 +116,14 @@ def machine_messages(bag: Path, mapping: MappingFile | None, *, with_answers: bo
     machine, state = machine_in(bag, mapping)
     answers: list[tuple[str, str, bytes]] = []
 
-    def collect(name: str, record: m.Output, frame_id: bytes) -> None:
-        kind = m.type_of(record)
-        answers.append((f'/{name}/{LAST_PART[kind]}', kind, m.encode(record, frame_id)))
+    def collect(name: str, record: records.Output, frame_id: bytes) -> None:
+        kind = coder.type_of(record)
+        answers.append((f'/{name}/{LAST_PART[kind]}', kind, coder.encode(record, frame_id)))
 
-    text = m.encode_text(machine_text(snapshot_of(machine, state)))
+    text = coder.encode_text(machine_text(snapshot_of(machine, state)))
     for number, message in enumerate(read_messages(bag)):
         if number == 0:
-            yield BagMessage(MACHINE_CONFIGURATION, m.CONFIGURATION_TYPE, message.log_time, text)
+            yield BagMessage(MACHINE_CONFIGURATION, layouts.CONFIGURATION_TYPE, message.log_time, text)
         if message.topic in machine.plans:
             yield message._replace(publish_time=message.log_time)  # it does not tell when it was sent
             if with_answers:
@@ -127,7 +132,7 @@ def machine_messages(bag: Path, mapping: MappingFile | None, *, with_answers: bo
                     state = receive(machine, state, plan, plan.read(message.data), message.log_time, collect)
                 yield from (BagMessage(topic, kind, message.log_time, data) for topic, kind, data in answers)
                 answers.clear()
-        elif message.type_name not in (*m.DECODERS, MACHINE_TYPE):
+        elif message.type_name not in (*coder.DECODERS, MACHINE_TYPE):
             yield message
 
 
@@ -152,7 +157,7 @@ class Translation:
         """Topics of the machine."""
         return self._plans.keys()
 
-    def records(self, message: BagMessage, missing: Counter[str]) -> Iterator[tuple[int, m.Input, bytes]]:
+    def records(self, message: BagMessage, missing: Counter[str]) -> Iterator[tuple[int, records.Input, bytes]]:
         """Number of the actuator, record and frame name of what a message makes, in the order of the estimator.
 
         Args:
@@ -192,7 +197,7 @@ class Translation:
 def is_for(mapping: MappingFile, infos: Mapping[str, TopicInfo]) -> bool:
     """Whether a bag is read by a mapping file: not if it has none of its topics, but velocities of this project."""
     present = {info.type_name for info in infos.values() if info.message_count}
-    return m.VELOCITY_TYPE not in present or not infos.keys().isdisjoint(mapping.file.topics)
+    return layouts.VELOCITY_TYPE not in present or not infos.keys().isdisjoint(mapping.file.topics)
 
 
 def lacking(missing: Mapping[str, int]) -> list[str]:

@@ -56,7 +56,7 @@ class Channel(NamedTuple):
     """Description of a topic in a file."""
 
     topic: str
-    encoding: str  # of its messages; ``cdr`` for ROS 2
+    encoding: str  # of its messages; `ENCODING` for ROS 2
     description: Description
 
 

@@ -35,6 +35,8 @@ from mcap.records import (
 )
 from mcap.writer import MCAP0_MAGIC
 
+from seal_friction_ros.core.messages.cdr import ENCODING
+
 CHUNK_SIZE = 64 * 1024  # [bytes] small, so that the writing thread blocks briefly; the file does not get larger
 FILE_MODE = 0o640  # of the files of a bag, less what the umask of the process forbids
 _MESSAGE = struct.Struct('<BQHIQQ')  # opcode, length of the rest, channel, sequence number, log time, publish time
@@ -160,7 +162,7 @@ class McapOutput:
             key: Its topic and type.
             description: Of the topic.
             log_time: [ns] after that of the last message.
-            data: CDR.
+            data: Its bytes.
             publish_time: [ns] on any clock; None: ``log_time``.
         """
         channel = self._channels.get(key) or self._add_channel(key, description, log_time)
@@ -177,7 +179,7 @@ class McapOutput:
         number = self._channels[key] = len(self._channels) + 1
         type_name, encoding, definition, metadata = description
         schema = Schema(id=number, name=type_name, encoding=encoding, data=definition)
-        channel = Channel(id=number, schema_id=number, topic=key[0], message_encoding='cdr', metadata=metadata)
+        channel = Channel(id=number, schema_id=number, topic=key[0], message_encoding=ENCODING, metadata=metadata)
         self._schema_records.append(_packed(schema))
         self._channel_records.append(_packed(channel))
         self._chunk.data += self._schema_records[-1] + self._channel_records[-1]

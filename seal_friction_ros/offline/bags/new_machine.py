@@ -16,13 +16,8 @@ from tempfile import TemporaryDirectory
 
 from seal_friction_ros.core.machine.gauge_or_absolute import LOWEST_ABSOLUTE
 from seal_friction_ros.core.machine.machine_file import FLUID_PRESSURE, ONLY_FIELDS
-from seal_friction_ros.core.machine.message_fields import (
-    Definition,
-    Reader,
-    names_in,
-    number_paths,
-    short_name,
-)
+from seal_friction_ros.core.messages.definitions import Definition, number_paths, short_name
+from seal_friction_ros.core.messages.fields import Reader, names_in
 from seal_friction_ros.offline.bags.bag import BagError, bag_topics, read_definitions, read_messages
 from seal_friction_ros.offline.work.targets import mark
 

@@ -12,20 +12,20 @@ from typing import Any
 import numpy as np
 
 from seal_friction_ros.core.estimation.configuration import parse_snapshot
-from seal_friction_ros.core.estimation.message_blocks import Messages
-from seal_friction_ros.core.estimation.messages import FEEDFORWARD_TYPE, decode_text
-from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.documents import NotJsonError, parse_json
 from seal_friction_ros.core.friction.actuator import MountedSeal
 from seal_friction_ros.core.friction.force_sum_correction import corrected_force_sum, one_correction
 from seal_friction_ros.core.friction.mounting import pressures_at_seals
+from seal_friction_ros.core.messages.blocks import Numbers, frame_names
+from seal_friction_ros.core.messages.coder import decode_text
+from seal_friction_ros.core.messages.layouts import FEEDFORWARD_TYPE
+from seal_friction_ros.core.messages.records import FrictionEstimate, Status
 from seal_friction_ros.offline.bags.actuator_bag import RECORDED, ActuatorBag, open_actuator
 from seal_friction_ros.offline.bags.bag import BagError
 from seal_friction_ros.offline.bags.columns import (
     Block,
     Held,
-    Numbers,
     Wanted,
     collected,
     extend,
@@ -138,7 +138,10 @@ class RunCollector:
                 parse_json(text, 'configuration')
             before = len(self.stamps) + int(np.searchsorted(estimates.places, place))
             self._configurations.append((log_time, before, text))
-        self._add_frames(block.messages, found['velocity'].places)
+        for frame in frame_names(block.messages, found['velocity'].places):
+            if len(self._frames) >= _MAX_FRAMES:
+                break
+            self._frames[frame] = None
         inputs = self._inputs_of(estimates, found)
         forces = np.full((2, len(estimates.places)), math.nan)
         for row, name in enumerate(('feedforward', 'acted'), start=-2):
@@ -175,18 +178,6 @@ class RunCollector:
         places = before[before >= 0]
         same = estimates.stamps[places] == feedforwards.stamps[before >= 0]
         forces[places[same]] = feedforwards.numbers[0, before >= 0][same]
-
-    def _add_frames(self, messages: Messages, places: IntArray) -> None:
-        """Keep the frame names of velocity samples, up to `_MAX_FRAMES`."""
-        offsets = messages.offsets[places]
-        while len(offsets) and len(self._frames) < _MAX_FRAMES:
-            first = int(offsets[0])
-            length = int.from_bytes(messages.data[first + 12 : first + 16].tobytes(), 'little')
-            name = messages.data[first + 12 : first + 16 + length]
-            self._frames[name[4:-1].tobytes()] = None
-            inside = offsets + 16 + length <= len(messages.data)
-            offsets = offsets[inside]
-            offsets = offsets[(messages.data[offsets[:, np.newaxis] + 12 + np.arange(4 + length)] != name).any(axis=1)]
 
     def run(self, source: ActuatorBag) -> RecordedRun:
         """Arrays of all messages so far; an input that cannot be a measurement becomes NaN."""

@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 
+from seal_friction_ros.core.messages.cdr import ENCODING
 from seal_friction_ros.files import parse_yaml
 from seal_friction_ros.offline.bags import mcap_reader
 from seal_friction_ros.offline.bags.bag import BagError, BagWriter
@@ -110,8 +111,8 @@ def _copy(path: Path, writer: BagWriter, found: Recovery) -> None:
                 found.damage.append(f'{path.name}: {layout.damage}')
             for channel, log_time, publish_time, data in mcap_reader.messages(file, layout, on_fault, locate):
                 topic, encoding, description = channel
-                if encoding != 'cdr':
-                    raise BagError(f'{path}: {topic} is encoded as {encoding[:40]!r}, not as CDR')
+                if encoding != ENCODING:
+                    raise BagError(f'{path}: {topic} is encoded as {encoding[:40]!r}, not as {ENCODING}')
                 if (topic, description.type_name) not in descriptions:
                     descriptions[topic, description.type_name] = _described(channel)
                 known = descriptions[topic, description.type_name]

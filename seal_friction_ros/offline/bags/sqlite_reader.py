@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
+from seal_friction_ros.core.messages.cdr import ENCODING
 from seal_friction_ros.offline.bags.mcap_reader import LARGEST_CHUNK, BagMessage, Channel
 from seal_friction_ros.offline.bags.mcap_writer import Description
 
@@ -38,7 +39,7 @@ def file_channels(path: Path) -> list[tuple[Channel, int]]:
         found = []
         for number, name, type_name in _names(database):
             encoding, text = definitions.get(type_name, ('', ''))
-            channel = Channel(name, 'cdr', Description(type_name, encoding, text.encode(), {}))
+            channel = Channel(name, ENCODING, Description(type_name, encoding, text.encode(), {}))
             found.append((channel, counts.get(number, 0)))
         return found
 

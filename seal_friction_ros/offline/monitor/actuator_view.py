@@ -9,19 +9,6 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING, Configuration
-from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
-from seal_friction_ros.core.estimation.records import (
-    NEVER,
-    NO_ESTIMATE,
-    Force,
-    FrictionEstimate,
-    Position,
-    Pressure,
-    ServoReference,
-    Status,
-    Temperature,
-    Velocity,
-)
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.friction.force_sum_correction import (
     NO_CORRECTION,
@@ -29,6 +16,20 @@ from seal_friction_ros.core.friction.force_sum_correction import (
     corrected_force_sum,
 )
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages.records import (
+    NEVER,
+    NO_ESTIMATE,
+    FeedForward,
+    Force,
+    FrictionEstimate,
+    Limited,
+    Position,
+    Pressure,
+    ServoReference,
+    Status,
+    Temperature,
+    Velocity,
+)
 
 BAR = 1e5  # [Pa]
 MICROMETRE = 1e-6  # [m]

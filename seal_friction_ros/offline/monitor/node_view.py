@@ -4,16 +4,12 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from seal_friction_ros.core.estimation.messages import (
-    CONFIGURATION_TYPE,
-    DECODERS,
-    decode_text,
-)
-from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, decode_together
 from seal_friction_ros.core.machine.machine import Machine, init
 from seal_friction_ros.core.machine.machine_snapshot import machine_of, parse_machine_text
-from seal_friction_ros.core.machine.message_fields import Definition
-from seal_friction_ros.core.machine.newest_messages import decode_newest
+from seal_friction_ros.core.messages.coder import DECODERS, decode_text
+from seal_friction_ros.core.messages.definitions import Definition
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, MACHINE_TYPE
+from seal_friction_ros.core.messages.together import decode_newest, decode_together
 from seal_friction_ros.offline.bags.bag import BagMessage
 from seal_friction_ros.offline.bags.mapped_bag import Translation
 from seal_friction_ros.offline.monitor.actuator_view import (

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, ESTIMATE_TYPE
-from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE
+from seal_friction_ros.core.messages.coder import DECODERS
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, ESTIMATE_TYPE, MACHINE_TYPE
 from seal_friction_ros.offline.bags.actuator_bag import RECORDED
 from seal_friction_ros.offline.bags.bag import (
     BagError,

@@ -6,8 +6,8 @@ from itertools import islice
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation.configuration import ALGORITHM_VERSION
-from seal_friction_ros.core.estimation.messages import DECODERS, ESTIMATE_TYPE, FEEDFORWARD_TYPE, GROWN
-from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE
+from seal_friction_ros.core.messages.coder import DECODERS
+from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE, FEEDFORWARD_TYPE, GROWN, MACHINE_TYPE
 
 LONGEST_QUEUE = 100_000  # replayed answers that may wait for a recorded one; bounds memory if recording has stopped
 

@@ -17,16 +17,15 @@ from seal_friction_ros.core.estimation.compiled_pipeline import Answers
 from seal_friction_ros.core.estimation.configuration import Configuration, Snapshot
 from seal_friction_ros.core.estimation.estimator import DEFAULT_ADAPTATION
 from seal_friction_ros.core.estimation.friction_filter import PROVEN
-from seal_friction_ros.core.estimation.message_blocks import Messages, UnsuitedError
-from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE
-from seal_friction_ros.core.estimation.records import NEVER, NO_ESTIMATE, FrictionEstimate
 from seal_friction_ros.core.estimation.seal_health import START, Starts, with_sample
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.friction.states import SLIDING
+from seal_friction_ros.core.messages.blocks import Messages, UnsuitedError, numbers_of
+from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE
+from seal_friction_ros.core.messages.records import NEVER, NO_ESTIMATE, FrictionEstimate
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.bags.actuator_bag import open_actuator
 from seal_friction_ros.offline.bags.bag import BagError
-from seal_friction_ros.offline.bags.columns import numbers_of
 from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS
 from seal_friction_ros.offline.replay.bag_parts import Chosen, try_bags

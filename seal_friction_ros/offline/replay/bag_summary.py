@@ -8,13 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.estimation.compiled_pipeline import Answers
-from seal_friction_ros.core.estimation.message_blocks import Kind, Messages
-from seal_friction_ros.core.estimation.messages import PRESSURE_TYPE
-from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.friction.states import SLIDING
+from seal_friction_ros.core.messages.blocks import Kind, Messages, numbers_of
+from seal_friction_ros.core.messages.layouts import PRESSURE_TYPE
+from seal_friction_ros.core.messages.records import Status
 from seal_friction_ros.offline.bags.bag import BagError, bag_topics
-from seal_friction_ros.offline.bags.columns import numbers_of
 from seal_friction_ros.offline.replay.bag_health import bag_health
 from seal_friction_ros.offline.replay.bag_parts import AS_RECORDED, Chosen, try_bags
 from seal_friction_ros.offline.replay.compiled_replay import compile_now, first_configurations

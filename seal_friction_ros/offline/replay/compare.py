@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from seal_friction_ros.core.estimation.messages import DECODERS, ESTIMATE_TYPE
+from seal_friction_ros.core.messages.coder import DECODERS
+from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE
 from seal_friction_ros.offline.bags.actuator_bag import find_topic, open_actuator, recorded_machine
 from seal_friction_ros.offline.bags.bag import BagError, BagMessage, bag_topics, named, read_messages
 from seal_friction_ros.offline.bags.mapped_bag import MappingFile, is_for

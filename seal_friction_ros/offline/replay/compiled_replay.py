@@ -11,15 +11,11 @@ import numpy as np
 
 from seal_friction_ros.core.estimation.compiled_pipeline import Answers, receive_all
 from seal_friction_ros.core.estimation.configuration import Configuration, Snapshot, parse_snapshot
-from seal_friction_ros.core.estimation.message_blocks import Bytes, Integers, Kind, Messages, UnsuitedError
-from seal_friction_ros.core.estimation.messages import (
-    ESTIMATE_TYPE,
-    FEEDFORWARD_TYPE,
-    GROWN,
-    decode_text,
-)
 from seal_friction_ros.core.estimation.pipeline import PipelineState, init
 from seal_friction_ros.core.foundation.compiled import compiled
+from seal_friction_ros.core.messages.blocks import Bytes, Integers, Kind, Messages, UnsuitedError
+from seal_friction_ros.core.messages.coder import decode_text
+from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE, FEEDFORWARD_TYPE, GROWN
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.bags import block_reader
 from seal_friction_ros.offline.bags.actuator_bag import TYPES, Topics, first_snapshot, open_actuator

@@ -7,21 +7,6 @@ from typing import NamedTuple
 from seal_friction_ros.core.estimation.configuration import Configuration, SealSelection
 from seal_friction_ros.core.estimation.estimator import DEFAULT_ADAPTATION, EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
-from seal_friction_ros.core.estimation.messages import (
-    CLOCK_TYPE,
-    CONFIGURATION_TYPE,
-    ESTIMATE_TYPE,
-    FEEDFORWARD_TYPE,
-    OUTPUTS,
-    TICK_TYPE,
-    Output,
-    decode_text,
-    encode,
-    encode_text,
-    type_of,
-)
-from seal_friction_ros.core.estimation.records import NEVER
-from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, NamedAnswer, encode_together
 from seal_friction_ros.core.machine.machine import Machine, MachineState, TopicPlan, receive, record_plan
 from seal_friction_ros.core.machine.machine_file import MachineFile
 from seal_friction_ros.core.machine.machine_snapshot import (
@@ -32,8 +17,20 @@ from seal_friction_ros.core.machine.machine_snapshot import (
     parse_machine_text,
     snapshot_of,
 )
-from seal_friction_ros.core.machine.message_fields import full_name
 from seal_friction_ros.core.machine.outputs import due_commands
+from seal_friction_ros.core.messages.coder import decode_text, encode, encode_text, type_of
+from seal_friction_ros.core.messages.definitions import full_name
+from seal_friction_ros.core.messages.layouts import (
+    CLOCK_TYPE,
+    CONFIGURATION_TYPE,
+    ESTIMATE_TYPE,
+    FEEDFORWARD_TYPE,
+    MACHINE_TYPE,
+    OUTPUTS,
+    TICK_TYPE,
+)
+from seal_friction_ros.core.messages.records import NEVER, Output
+from seal_friction_ros.core.messages.together import NamedAnswer, encode_together
 from seal_friction_ros.files import default_configuration, load_configuration, load_parameter_file, with_seal
 from seal_friction_ros.offline.bags.actuator_bag import (
     ANSWER_TOPICS,

@@ -12,8 +12,8 @@ from itertools import pairwise
 from pathlib import Path
 
 from seal_friction_ros.core.estimation.configuration import ALGORITHM_VERSION, Snapshot, parse_snapshot, snapshot_text
-from seal_friction_ros.core.estimation.message_blocks import Kind, UnsuitedError
-from seal_friction_ros.core.estimation.messages import decode_text
+from seal_friction_ros.core.messages.blocks import Kind, UnsuitedError
+from seal_friction_ros.core.messages.coder import decode_text
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.bags.actuator_bag import Topics
 from seal_friction_ros.offline.bags.block_reader import Stretch, read_in_bulk, times_of

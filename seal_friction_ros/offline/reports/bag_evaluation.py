@@ -16,12 +16,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.estimation.messages import DECODERS
-from seal_friction_ros.core.estimation.records import EXTRAPOLATED, Status
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages.coder import DECODERS
+from seal_friction_ros.core.messages.records import EXTRAPOLATED, Status
 from seal_friction_ros.offline.bags.recorded_run import LARGEST_INPUT, MAX_GAP, RecordedRun
 
 TRIMMED_SHARE = 0.2  # of the samples of a stroke, dropped at each end: starting and stopping

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages.records import Status
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports.bag_evaluation import BagEvaluation, PressureLevel, worst_level

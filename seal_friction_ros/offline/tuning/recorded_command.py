@@ -4,7 +4,9 @@ from functools import partial
 
 import numpy as np
 
-from seal_friction_ros.core.machine.message_fields import Reader
+from seal_friction_ros.core.messages.blocks import Numbers
+from seal_friction_ros.core.messages.fields import Reader
+from seal_friction_ros.core.messages.layouts import NUMBER_TYPE, NUMBERS_TYPE
 from seal_friction_ros.core.tuning.output_gain import CommandRecord, OutputGain, output_gain
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings
 from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag
@@ -12,7 +14,6 @@ from seal_friction_ros.offline.bags.bag import BagError, read_definitions
 from seal_friction_ros.offline.bags.columns import (
     Block,
     Held,
-    Numbers,
     Wanted,
     collected,
     extend,
@@ -20,8 +21,7 @@ from seal_friction_ros.offline.bags.columns import (
     wanted_of,
 )
 
-NUMBER, NUMBERS = 'std_msgs/msg/Float64', 'std_msgs/msg/Float64MultiArray'
-_FIELDS = {NUMBER: 'data', NUMBERS: 'data[0]'}
+_FIELDS = {NUMBER_TYPE: 'data', NUMBERS_TYPE: 'data[0]'}
 _HELD = {'command': 1, 'pressure': 2, 'position': 1}
 
 
@@ -72,7 +72,7 @@ def read_output_gain(source: ActuatorBag, topic: str, known: RecordedAxisSetting
     kind = source.infos[topic].type_name if topic in source.infos else ''
     if kind not in _FIELDS:
         what = f'is {kind}' if kind else 'is not in it'
-        raise BagError(f'{bag}: the command {topic} {what}: it has to be {NUMBER} or {NUMBERS}')
+        raise BagError(f'{bag}: the command {topic} {what}: it has to be {NUMBER_TYPE} or {NUMBERS_TYPE}')
     (definition,) = read_definitions(bag, [kind]).values()
     reader = Reader(definition, kind, [_FIELDS[kind]])
     wanted = {**wanted_of(source, ('velocity', 'pressure', 'position')), 'command': Wanted(topic, kind)}

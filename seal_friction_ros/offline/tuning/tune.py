@@ -16,19 +16,20 @@ import yaml
 from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING, Configuration, parse_snapshot
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
-from seal_friction_ros.core.estimation.messages import (
+from seal_friction_ros.core.estimation.node_options import FEEDFORWARD_PREFIX
+from seal_friction_ros.core.estimation.pipeline import NO_REFERENCE, condition_reference, is_possible
+from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
+from seal_friction_ros.core.foundation.parameters import meanings
+from seal_friction_ros.core.foundation.units import MM, MS, UM
+from seal_friction_ros.core.messages.blocks import Numbers
+from seal_friction_ros.core.messages.layouts import (
     ESTIMATE_TYPE,
     FEEDFORWARD_TYPE,
     FORCE_TYPE,
     PRESSURE_TYPE,
     REFERENCE_TYPE,
 )
-from seal_friction_ros.core.estimation.node_options import FEEDFORWARD_PREFIX
-from seal_friction_ros.core.estimation.pipeline import NO_REFERENCE, condition_reference, is_possible
-from seal_friction_ros.core.estimation.records import ServoReference
-from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
-from seal_friction_ros.core.foundation.parameters import meanings
-from seal_friction_ros.core.foundation.units import MM, MS, UM
+from seal_friction_ros.core.messages.records import ServoReference
 from seal_friction_ros.core.servo.closed_loop import IDEAL_SENSORS, Axis, AxisSensors
 from seal_friction_ros.core.servo.sensors import SensorSettings
 from seal_friction_ros.core.servo.simulator_options import (
@@ -51,7 +52,7 @@ from seal_friction_ros.core.tuning.simulated_axis import MOST_CANDIDATES, Tuning
 from seal_friction_ros.files import default_configuration, read_parameters
 from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag
 from seal_friction_ros.offline.bags.bag import BagError
-from seal_friction_ros.offline.bags.columns import Block, Numbers, collected
+from seal_friction_ros.offline.bags.columns import Block, collected
 from seal_friction_ros.offline.bags.recorded_run import RunCollector, wanted_of_run
 from seal_friction_ros.offline.replay.replay import Replay
 from seal_friction_ros.offline.work.atomic_file import write_whole

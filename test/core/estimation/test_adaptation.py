@@ -36,11 +36,12 @@ from seal_friction_ros.core.estimation.disagreement import Reversal, likely_reas
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, step
 from seal_friction_ros.core.estimation.friction_change import FrictionChange, watch
 from seal_friction_ros.core.estimation.friction_filter import NOT_BEGUN
-from seal_friction_ros.core.estimation.records import Force, FrictionEstimate, Pressure, RodSample, Status
+from seal_friction_ros.core.estimation.records import RodSample
 from seal_friction_ros.core.friction.actuator import ActuatorFriction, MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import BREAKAWAY, SLIDING, STUCK
+from seal_friction_ros.core.messages.records import Force, FrictionEstimate, Pressure, Status
 from seal_friction_ros.files import read_yaml
 
 SEAL = parse_seal(read_yaml(ROOT / 'config' / 'seals' / 'ms28775_114.yaml'))

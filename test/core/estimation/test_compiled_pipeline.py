@@ -21,30 +21,7 @@ from paths import ROOT
 from seal_friction_ros.core.estimation.compiled_pipeline import receive_all
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters
 from seal_friction_ros.core.estimation.feedforward import FADED_IN
-from seal_friction_ros.core.estimation.message_blocks import Kind, Messages, UnsuitedError
-from seal_friction_ros.core.estimation.messages import (
-    ESTIMATE_TYPE,
-    FEEDFORWARD_TYPE,
-    FORCE_TYPE,
-    PRESSURE_TYPE,
-    REFERENCE_TYPE,
-    TEMPERATURE_TYPE,
-    TICK_TYPE,
-    VELOCITY_TYPE,
-    decode,
-    encode,
-    type_of,
-)
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, init, receive
-from seal_friction_ros.core.estimation.records import (
-    NEVER,
-    Force,
-    Pressure,
-    ServoReference,
-    Temperature,
-    Velocity,
-    WatchdogTick,
-)
 from seal_friction_ros.core.foundation.compiled import compiled, for_compiler
 from seal_friction_ros.core.foundation.parameters import parameter
 from seal_friction_ros.core.friction.actuator import MountedSeal, friction_of_seals
@@ -59,6 +36,27 @@ from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.presliding import Presliding
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.temperature import TemperatureScale
+from seal_friction_ros.core.messages.blocks import Kind, Messages, UnsuitedError
+from seal_friction_ros.core.messages.coder import decode, encode, type_of
+from seal_friction_ros.core.messages.layouts import (
+    ESTIMATE_TYPE,
+    FEEDFORWARD_TYPE,
+    FORCE_TYPE,
+    PRESSURE_TYPE,
+    REFERENCE_TYPE,
+    TEMPERATURE_TYPE,
+    TICK_TYPE,
+    VELOCITY_TYPE,
+)
+from seal_friction_ros.core.messages.records import (
+    NEVER,
+    Force,
+    Pressure,
+    ServoReference,
+    Temperature,
+    Velocity,
+    WatchdogTick,
+)
 from seal_friction_ros.files import read_yaml
 
 SEALS = {path.stem: parse_seal(read_yaml(path)) for path in sorted((ROOT / 'config' / 'seals').glob('*.yaml'))}

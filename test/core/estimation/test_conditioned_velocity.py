@@ -13,7 +13,7 @@ from seal_friction_ros.core.estimation.conditioned_velocity import (
     condition_velocity,
     confirmed_velocity,
 )
-from seal_friction_ros.core.estimation.records import NEVER
+from seal_friction_ros.core.messages.records import NEVER
 
 # Numbers of the module docstring and of docs, repeated here so that a change is noticed.
 LONGEST_STEP = 0.02  # [s]

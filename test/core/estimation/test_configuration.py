@@ -29,23 +29,22 @@ from seal_friction_ros.core.estimation.configuration import (
 from seal_friction_ros.core.estimation.estimator import NO_SPEED, EstimatorSettings, EstimatorState, Speed
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, FeedForwardState
 from seal_friction_ros.core.estimation.hidden_motion import NO_HIDDEN_MOTION, HiddenMotion
-from seal_friction_ros.core.estimation.messages import decode_text, encode_text
 from seal_friction_ros.core.estimation.pipeline import NO_REFERENCE, PipelineState, ReceiptTimes, Reference, init
-from seal_friction_ros.core.estimation.records import (
+from seal_friction_ros.core.estimation.records import NO_TEMPERATURE, SealTemperature
+from seal_friction_ros.core.estimation.sheared_seals import NOT_FOLLOWED, FollowedShear
+from seal_friction_ros.core.estimation.swings import NO_SWING, Swing
+from seal_friction_ros.core.friction.presliding import NO_ELEMENTS, SLOTS, Elements
+from seal_friction_ros.core.messages.coder import decode_text, encode_text
+from seal_friction_ros.core.messages.records import (
     NEVER,
     NO_FORCE,
     NO_PRESSURE,
-    NO_TEMPERATURE,
     Force,
     Pressure,
-    SealTemperature,
     ServoReference,
     Velocity,
     field_names,
 )
-from seal_friction_ros.core.estimation.sheared_seals import NOT_FOLLOWED, FollowedShear
-from seal_friction_ros.core.estimation.swings import NO_SWING, Swing
-from seal_friction_ros.core.friction.presliding import NO_ELEMENTS, SLOTS, Elements
 from seal_friction_ros.files import load_configuration, read_yaml
 
 MS = 1_000_000  # [ns]

@@ -8,12 +8,7 @@ import pytest
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.adaptation import NO_STROKE, Stroke
-from seal_friction_ros.core.estimation.disagreement import (
-    Reversal,
-    input_fault,
-    likely_reason,
-    reversal_between,
-)
+from seal_friction_ros.core.estimation.disagreement import Reversal, input_fault, likely_reason, reversal_between
 from seal_friction_ros.core.foundation.units import PSI
 from seal_friction_ros.core.friction.actuator import MountedSeal, Uncertainty, friction_of_seals, numbers_of_law
 from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb

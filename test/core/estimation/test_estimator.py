@@ -13,16 +13,7 @@ from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.conditioned_velocity import NOT_CONDITIONED, SETTLING
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, EstimatorState, step
 from seal_friction_ros.core.estimation.friction_filter import NOT_BEGUN
-from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, decode, encode
-from seal_friction_ros.core.estimation.records import (
-    NO_FORCE,
-    NO_PRESSURE,
-    Force,
-    FrictionEstimate,
-    Pressure,
-    RodSample,
-    Status,
-)
+from seal_friction_ros.core.estimation.records import RodSample
 from seal_friction_ros.core.estimation.swings import LONGEST_SWING
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
@@ -31,6 +22,9 @@ from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.mounting import CHAMBERS
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages.coder import decode, encode
+from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE
+from seal_friction_ros.core.messages.records import NO_FORCE, NO_PRESSURE, Force, FrictionEstimate, Pressure, Status
 from seal_friction_ros.files import read_yaml
 
 SEALS = {

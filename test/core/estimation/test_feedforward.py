@@ -14,7 +14,6 @@ from seal_friction_ros.core.estimation.feedforward import (
     FADED_IN,
     FADED_OUT,
     FeedForwardSettings,
-    Limited,
     compensation,
     elastic_compensation,
     elastic_step,
@@ -23,7 +22,6 @@ from seal_friction_ros.core.estimation.feedforward import (
     usable,
     wanted_velocity,
 )
-from seal_friction_ros.core.estimation.records import NEVER, FrictionEstimate, Status
 from seal_friction_ros.core.friction.presliding import (
     NO_ELEMENTS,
     Elements,
@@ -32,6 +30,7 @@ from seal_friction_ros.core.friction.presliding import (
     presliding_numbers,
 )
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages.records import NEVER, FrictionEstimate, Limited, Status
 
 MS = 1_000_000  # [ns]
 NONE = -1.0  # no usable friction

@@ -6,7 +6,7 @@ from statistics import fmean, pvariance
 import pytest
 
 from seal_friction_ros.core.estimation.friction_change import FrictionChange, watch
-from seal_friction_ros.core.estimation.records import NEVER
+from seal_friction_ros.core.messages.records import NEVER
 
 # Numbers of the module docstring, repeated here so that a change is noticed.
 REFERENCE_REVERSALS = 20

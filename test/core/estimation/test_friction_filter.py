@@ -47,7 +47,7 @@ from seal_friction_ros.core.estimation.friction_filter import (
     product,
     updated,
 )
-from seal_friction_ros.core.estimation.records import NEVER
+from seal_friction_ros.core.messages.records import NEVER
 
 SECOND = 1_000_000_000  # [ns]
 INTERVAL = 0.02  # [s] between readings

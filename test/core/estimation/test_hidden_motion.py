@@ -15,8 +15,9 @@ from seal_friction_ros.core.estimation.hidden_motion import (
     HiddenMotion,
     with_sample,
 )
-from seal_friction_ros.core.estimation.records import Force, FrictionEstimate, Pressure, RodSample, Status
+from seal_friction_ros.core.estimation.records import RodSample
 from seal_friction_ros.core.friction.states import SLIDING
+from seal_friction_ros.core.messages.records import Force, FrictionEstimate, Pressure, Status
 from seal_friction_ros.files import default_configuration
 
 START = 10**12  # [ns]

@@ -22,7 +22,7 @@ from seal_friction_ros.core.estimation.pipeline import (
     init,
     is_tick_due,
 )
-from seal_friction_ros.core.estimation.records import (
+from seal_friction_ros.core.messages.records import (
     NEVER,
     Clock,
     Force,

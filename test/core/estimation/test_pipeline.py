@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 from seal_friction_ros.core.estimation import adaptation, estimator
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.conditioned_velocity import NOT_CONDITIONED, SETTLING
-from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, Limited
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.friction_filter import NOT_BEGUN, Reading, begun
-from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, FEEDFORWARD_TYPE, encode, type_of
 from seal_friction_ros.core.estimation.pipeline import (
     NO_REFERENCE,
     TICK_INTERVAL,
@@ -29,13 +28,20 @@ from seal_friction_ros.core.estimation.pipeline import (
     is_tick_due,
     receive,
 )
-from seal_friction_ros.core.estimation.records import (
+from seal_friction_ros.core.estimation.records import NO_TEMPERATURE
+from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
+from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
+from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
+from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
+from seal_friction_ros.core.messages.coder import encode, type_of
+from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE, FEEDFORWARD_TYPE
+from seal_friction_ros.core.messages.records import (
     NEVER,
     NO_FORCE,
     NO_PRESSURE,
-    NO_TEMPERATURE,
     Clock,
     Force,
+    Limited,
     Position,
     Pressure,
     ServoReference,
@@ -43,10 +49,6 @@ from seal_friction_ros.core.estimation.records import (
     Velocity,
     WatchdogTick,
 )
-from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
-from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
-from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
-from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 
 PARAMETERS = compensating().parameters()
 MS = 1_000_000  # [ns]

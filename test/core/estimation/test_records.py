@@ -3,23 +3,21 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seal_friction_ros.core.estimation.records import (
+from seal_friction_ros.core.estimation.records import NO_TEMPERATURE, RodSample, SealTemperature
+from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages.records import (
     EXTRAPOLATED,
     NEVER,
     NO_ESTIMATE,
     NO_FORCE,
     NO_PRESSURE,
-    NO_TEMPERATURE,
     FrictionEstimate,
-    RodSample,
-    SealTemperature,
     ServoReference,
     Status,
     Temperature,
     Velocity,
     WatchdogTick,
 )
-from seal_friction_ros.core.friction.states import FrictionState
 
 
 @given(st.integers(-(2**31), 2**31 - 1), st.integers(0, 10**9 - 1))

@@ -14,7 +14,6 @@ from seal_friction_ros.core.estimation.disagreement import Reversal
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, EstimatorState, step
 from seal_friction_ros.core.estimation.friction_change import FrictionChange, watch
 from seal_friction_ros.core.estimation.friction_filter import NOT_BEGUN, FrictionFilter, Terms
-from seal_friction_ros.core.estimation.records import NEVER, NO_ESTIMATE, Pressure, Status
 from seal_friction_ros.core.estimation.seal_health import (
     SealHealth,
     Starts,
@@ -26,6 +25,7 @@ from seal_friction_ros.core.estimation.seal_health import (
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import BREAKAWAY, SLIDING, STUCK, UNKNOWN
+from seal_friction_ros.core.messages.records import NEVER, NO_ESTIMATE, Pressure, Status
 from seal_friction_ros.files import read_yaml
 
 SEAL = parse_seal(read_yaml(ROOT / 'config' / 'seals' / 'ms28775_114.yaml'))

@@ -14,25 +14,23 @@ from paths import ROOT
 from seal_friction_ros.core.estimation import pipeline
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, init, step
-from seal_friction_ros.core.estimation.feedforward import FeedForward
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters
-from seal_friction_ros.core.estimation.records import (
+from seal_friction_ros.core.estimation.records import NO_TEMPERATURE, RodSample, SealTemperature
+from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
+from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
+from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.core.friction.temperature import TemperatureScale, scale_at, std_of_unknown
+from seal_friction_ros.core.messages.records import (
     NEVER,
-    NO_TEMPERATURE,
+    FeedForward,
     Force,
     FrictionEstimate,
     Pressure,
-    RodSample,
-    SealTemperature,
     ServoReference,
     Status,
     Temperature,
     Velocity,
 )
-from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
-from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
-from seal_friction_ros.core.friction.seal_file import parse_seal
-from seal_friction_ros.core.friction.temperature import TemperatureScale, scale_at, std_of_unknown
 from seal_friction_ros.files import read_yaml
 
 MS = 1_000_000  # [ns]

@@ -14,7 +14,7 @@ from paths import ROOT
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.configuration import SealSelection, first_snapshot, parse_snapshot, snapshot_text
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, init, step
-from seal_friction_ros.core.estimation.records import NEVER, Force, FrictionEstimate, Pressure, RodSample, Status
+from seal_friction_ros.core.estimation.records import RodSample
 from seal_friction_ros.core.estimation.sheared_seals import (
     AT_REST,
     LEAST_STD,
@@ -53,6 +53,7 @@ from seal_friction_ros.core.friction.presliding import (
 )
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages.records import NEVER, Force, FrictionEstimate, Pressure, Status
 from seal_friction_ros.files import load_configuration, read_yaml
 
 START, MS = 10**12, 10**6  # [ns]

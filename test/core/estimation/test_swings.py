@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, init, step
-from seal_friction_ros.core.estimation.records import Force, FrictionEstimate, Pressure, RodSample, Status
+from seal_friction_ros.core.estimation.records import RodSample
 from seal_friction_ros.core.estimation.swings import LONGEST_SWING, NO_SWING, Swing, swing_on
+from seal_friction_ros.core.messages.records import Force, FrictionEstimate, Pressure, Status
 from seal_friction_ros.files import default_configuration
 
 START, RATE = 10**12, 1000.0  # [ns], [Hz]

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, init, step
-from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample
+from seal_friction_ros.core.estimation.records import RodSample
 from seal_friction_ros.core.foundation.errors import NotConvergedError
 from seal_friction_ros.core.friction.actuator import actuator_friction
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
@@ -26,6 +26,7 @@ from seal_friction_ros.core.lubrication.model import film_at_rest, profile_model
 from seal_friction_ros.core.lubrication.oring_film import oring_film
 from seal_friction_ros.core.lubrication.seal_profile import LubricationNumerics
 from seal_friction_ros.core.lubrication.topography import Topography
+from seal_friction_ros.core.messages.records import Force, Pressure
 from seal_friction_ros.core.oring_contact.oring_case import OringNumerics
 from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
 

@@ -5,8 +5,8 @@ import math
 import pytest
 from harness.machines import BENCH, parsed
 
-from seal_friction_ros.core.estimation.records import NO_PRESSURE, Pressure
 from seal_friction_ros.core.machine.gauge_or_absolute import Lowest, pressure_remarks
+from seal_friction_ros.core.messages.records import NO_PRESSURE, Pressure
 
 AMBIENT, LOADED = 1.0e5, 3.0e6  # [Pa]
 

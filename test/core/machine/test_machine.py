@@ -8,10 +8,14 @@ import pytest
 import yaml
 from harness.machines import BENCH, EXCAVATOR, made, message, message_class, parsed
 
-from seal_friction_ros.core.estimation.feedforward import FeedForward
-from seal_friction_ros.core.estimation.messages import TICK_TYPE
-from seal_friction_ros.core.estimation.records import (
+from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.machine import machine as m
+from seal_friction_ros.core.machine.machine_file import Spring, Weight
+from seal_friction_ros.core.machine.outputs import commands
+from seal_friction_ros.core.messages.layouts import TICK_TYPE
+from seal_friction_ros.core.messages.records import (
     NEVER,
+    FeedForward,
     Force,
     FrictionEstimate,
     Position,
@@ -21,10 +25,6 @@ from seal_friction_ros.core.estimation.records import (
     Velocity,
     WatchdogTick,
 )
-from seal_friction_ros.core.friction.states import FrictionState
-from seal_friction_ros.core.machine import machine as m
-from seal_friction_ros.core.machine.machine_file import Spring, Weight
-from seal_friction_ros.core.machine.outputs import commands
 from seal_friction_ros.files import machine_configurations
 
 MS = 1_000_000

@@ -6,8 +6,6 @@ import pytest
 from harness.machines import EXCAVATOR, installed, made, message
 
 from seal_friction_ros.core.estimation.configuration import first_snapshot, snapshot_text
-from seal_friction_ros.core.estimation.messages import INPUTS, encode
-from seal_friction_ros.core.estimation.records import Pressure, Velocity
 from seal_friction_ros.core.machine import machine as m
 from seal_friction_ros.core.machine.machine_snapshot import (
     machine_of,
@@ -15,6 +13,9 @@ from seal_friction_ros.core.machine.machine_snapshot import (
     parse_machine_text,
     snapshot_of,
 )
+from seal_friction_ros.core.messages.coder import encode
+from seal_friction_ros.core.messages.layouts import INPUTS
+from seal_friction_ros.core.messages.records import Pressure, Velocity
 from seal_friction_ros.files import default_configuration
 
 MS = 1_000_000  # [ns]

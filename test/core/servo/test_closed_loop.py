@@ -10,9 +10,8 @@ from paths import ROOT
 
 from seal_friction_ros.core.estimation import pipeline
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
-from seal_friction_ros.core.estimation.feedforward import FeedForward
-from seal_friction_ros.core.estimation.records import Force, Pressure, ServoReference, Velocity
 from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
+from seal_friction_ros.core.messages.records import FeedForward, Force, Pressure, ServoReference, Velocity
 from seal_friction_ros.core.servo import closed_loop
 from seal_friction_ros.core.servo.closed_loop import (
     EVALUATED_PERIODS,

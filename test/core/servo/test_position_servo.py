@@ -12,7 +12,7 @@ from paths import ROOT
 
 from seal_friction_ros.core.estimation import estimator
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters
-from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample
+from seal_friction_ros.core.estimation.records import RodSample
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
@@ -20,6 +20,7 @@ from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.presliding import Presliding
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages.records import Force, Pressure
 from seal_friction_ros.core.servo.closed_loop import Axis, run_closed_loop, with_wrong_friction
 from seal_friction_ros.core.servo.controller import ControllerState, Limited, ServoController, control, limit_reference
 from seal_friction_ros.core.servo.cylinder import Cylinder

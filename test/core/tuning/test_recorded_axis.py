@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from harness.compensation import COMPENSATING
 
-from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages.records import Status
 from seal_friction_ros.core.tuning.recorded_axis import (
     RecordedLaw,
     Recording,

@@ -19,7 +19,8 @@ from paths import ROOT
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, decode_text, encode_text
+from seal_friction_ros.core.messages.coder import DECODERS, decode_text, encode_text
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE
 from seal_friction_ros.offline.bags.bag import (
     BagError,
     BagWriter,

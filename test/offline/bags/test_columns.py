@@ -11,9 +11,10 @@ from harness.example_bags import TOPICS, rewrite, write_recorded
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
-from seal_friction_ros.core.estimation.message_blocks import MOST_MESSAGES
-from seal_friction_ros.core.estimation.messages import PRESSURE_TYPE, VELOCITY_TYPE, encode
-from seal_friction_ros.core.estimation.records import Force, Position, Pressure, Temperature, Velocity
+from seal_friction_ros.core.messages.blocks import MOST_MESSAGES
+from seal_friction_ros.core.messages.coder import encode
+from seal_friction_ros.core.messages.layouts import PRESSURE_TYPE, VELOCITY_TYPE
+from seal_friction_ros.core.messages.records import Force, Position, Pressure, Temperature, Velocity
 from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.bags.actuator_bag import open_actuator
 from seal_friction_ros.offline.bags.columns import VelocityRows, read_velocity_rows

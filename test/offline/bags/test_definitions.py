@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from mcap.writer import Writer
 
-from seal_friction_ros.core.machine.message_fields import Field
+from seal_friction_ros.core.messages.definitions import Field
 from seal_friction_ros.offline.bags.bag import BagError, read_definitions
 
 NOT_INSTALLED = 'nav_msgs/Odometry'

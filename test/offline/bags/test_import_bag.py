@@ -11,7 +11,8 @@ from harness.closed_loop_bags import write_closed_loop
 from harness.standard_bags import MAPPING, write_standard
 from rosbags.rosbag2 import StoragePlugin
 
-from seal_friction_ros.core.estimation.messages import INPUTS, decode
+from seal_friction_ros.core.messages.coder import decode
+from seal_friction_ros.core.messages.layouts import INPUTS
 from seal_friction_ros.offline.bags.bag import BagError, BagWriter, read_messages
 from seal_friction_ros.offline.bags.import_bag import import_bag
 from seal_friction_ros.offline.commands.main import main

@@ -14,10 +14,11 @@ from hypothesis import strategies as st
 from paths import ROOT
 from scipy.optimize import least_squares
 
-from seal_friction_ros.core.estimation.messages import DECODERS, VELOCITY_TYPE, decode
 from seal_friction_ros.core.friction.geometry import projected_area, squeeze
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.identification.signal_preparation import SavitzkyGolay, slope
+from seal_friction_ros.core.messages.coder import DECODERS, decode
+from seal_friction_ros.core.messages.layouts import VELOCITY_TYPE
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.bags.bag import (
     FORCE_TOPIC,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from paths import ROOT
 
-from seal_friction_ros.core.estimation.messages import DECODERS
+from seal_friction_ros.core.messages.coder import DECODERS
 from seal_friction_ros.offline.bags.bag import FORCE_TOPIC, PRESSURE_TOPIC, VELOCITY_TOPIC, read_messages
 from seal_friction_ros.offline.bags.import_thesis import import_thesis, read_pulls
 

@@ -11,10 +11,10 @@ from harness.standard_bags import write_standard
 from paths import ROOT
 from rosbags.rosbag2 import StoragePlugin
 
-from seal_friction_ros.core.estimation.messages import encode
-from seal_friction_ros.core.estimation.records import Position
 from seal_friction_ros.core.machine.machine import make_machine
-from seal_friction_ros.core.machine.message_fields import parse_definition
+from seal_friction_ros.core.messages.coder import encode
+from seal_friction_ros.core.messages.definitions import parse_definition
+from seal_friction_ros.core.messages.records import Position
 from seal_friction_ros.files import config_path, machine_configurations, read_machine
 from seal_friction_ros.offline.bags.bag import BagError, BagWriter, read_messages
 from seal_friction_ros.offline.bags.import_bag import import_bag

@@ -6,17 +6,10 @@ import yaml
 from harness.compensation import compensating
 from harness.example_bags import STEP, rewrite, write_inputs, write_recorded
 
-from seal_friction_ros.core.estimation.messages import (
-    FORCE_TYPE,
-    POSITION_TYPE,
-    REFERENCE_TYPE,
-    VELOCITY_TYPE,
-    decode,
-    encode,
-    type_of,
-)
-from seal_friction_ros.core.estimation.records import Force, Status, Temperature, WatchdogTick
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages.coder import decode, encode, type_of
+from seal_friction_ros.core.messages.layouts import FORCE_TYPE, POSITION_TYPE, REFERENCE_TYPE, VELOCITY_TYPE
+from seal_friction_ros.core.messages.records import Force, Status, Temperature, WatchdogTick
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.bags.bag import BagError

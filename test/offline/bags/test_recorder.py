@@ -14,7 +14,8 @@ import yaml
 from harness.blocked_disk import BlockedDisk
 from mcap.reader import make_reader
 
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, decode_text, encode_text
+from seal_friction_ros.core.messages.coder import decode_text, encode_text
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE
 from seal_friction_ros.offline.bags import mcap_writer
 from seal_friction_ros.offline.bags import recorder as recorder_module
 from seal_friction_ros.offline.bags.bag import BagError, BagWriter, read_messages, timed_name

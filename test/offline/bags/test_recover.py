@@ -11,7 +11,8 @@ from harness.example_bags import write_inputs
 from mcap.writer import CompressionType, Writer
 from rosbags.highlevel import AnyReader
 
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, decode_text, encode_text
+from seal_friction_ros.core.messages.coder import decode_text, encode_text
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE
 from seal_friction_ros.offline.bags.bag import BagError, BagMessage, BagWriter, read_messages
 from seal_friction_ros.offline.bags.recover import recover
 from seal_friction_ros.offline.commands.main import main

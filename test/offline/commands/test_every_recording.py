@@ -16,7 +16,7 @@ from harness.three_recordings import NAMES, PRESSURES, SAMPLES, SEALS, Recording
 
 from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
-from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, FEEDFORWARD_TYPE, VELOCITY_TYPE
+from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE, FEEDFORWARD_TYPE, VELOCITY_TYPE
 from seal_friction_ros.files import load_configuration
 from seal_friction_ros.offline.bags.actuator_bag import open_actuator
 from seal_friction_ros.offline.commands.main import main

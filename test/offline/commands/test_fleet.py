@@ -11,7 +11,7 @@ from harness.compensation import compensating
 from harness.example_bags import rewrite, write_recorded
 from harness.report_page import checked_page
 
-from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, FEEDFORWARD_TYPE
+from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE, FEEDFORWARD_TYPE
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.replay import bag_summary as module
 

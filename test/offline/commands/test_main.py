@@ -14,7 +14,8 @@ from harness.example_bags import rewrite, write_inputs, write_recorded
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.configuration import ALGORITHM_VERSION
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, decode_text, encode_text
+from seal_friction_ros.core.messages.coder import decode_text, encode_text
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE
 from seal_friction_ros.offline.bags.bag import BagMessage, BagWriter
 from seal_friction_ros.offline.commands.main import main, make_parser
 

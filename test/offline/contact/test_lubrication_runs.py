@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from harness.ehl_cases import COARSE_RING, answer, measured_bag
 
-from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages.records import Status
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.bags.recorded_run import read_run
 from seal_friction_ros.offline.commands.main import main

@@ -10,11 +10,11 @@ from paths import ROOT
 
 from seal_friction_ros.core.estimation.adaptation import NEW_RUN
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings
-from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.core.foundation.units import LBF
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages.records import Status
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.replay.replay import replay

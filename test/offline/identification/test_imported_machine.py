@@ -8,7 +8,7 @@ from harness.foreign_messages import foreign_store
 from harness.identify_run import Run
 from rosbags.rosbag2 import StoragePlugin, Writer
 
-from seal_friction_ros.core.estimation.records import Status
+from seal_friction_ros.core.messages.records import Status
 from seal_friction_ros.offline.bags.import_bag import import_bag
 from seal_friction_ros.offline.bags.recorded_run import read_run
 from seal_friction_ros.offline.commands.main import main

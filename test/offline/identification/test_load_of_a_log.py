@@ -6,8 +6,8 @@ from harness import boom
 from harness.boom import Boom
 from harness.identify_run import Run, estimates_of
 
-from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages.records import Status
 from seal_friction_ros.offline.bags.import_log import read_samples
 from seal_friction_ros.offline.bags.rig_file import read_rig
 

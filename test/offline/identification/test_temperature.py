@@ -6,10 +6,11 @@ import math
 import numpy as np
 import pytest
 
-from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, TEMPERATURE_TYPE, decode
-from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.temperature import std_of_unknown
+from seal_friction_ros.core.messages.coder import decode
+from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE, TEMPERATURE_TYPE
+from seal_friction_ros.core.messages.records import Status
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.bags.actuator_bag import find_topics
 from seal_friction_ros.offline.bags.bag import BagWriter, read_messages

@@ -6,18 +6,19 @@ import math
 import pytest
 
 from seal_friction_ros.core.estimation.adaptation import MODES, AdaptationSettings
-from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
-from seal_friction_ros.core.estimation.records import (
+from seal_friction_ros.core.foundation.normal_distribution import BAND_95
+from seal_friction_ros.core.friction.states import SLIDING, STUCK, FrictionState
+from seal_friction_ros.core.messages.records import (
+    FeedForward,
     Force,
     FrictionEstimate,
+    Limited,
     Position,
     Pressure,
     ServoReference,
     Status,
     Velocity,
 )
-from seal_friction_ros.core.foundation.normal_distribution import BAND_95
-from seal_friction_ros.core.friction.states import SLIDING, STUCK, FrictionState
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.monitor.actuator_view import (
     COLUMNS,

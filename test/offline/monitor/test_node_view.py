@@ -9,18 +9,12 @@ import pytest
 from harness.machines import EXCAVATOR, installed, made
 
 from seal_friction_ros.core.estimation.configuration import first_snapshot, snapshot_text
-from seal_friction_ros.core.estimation.feedforward import FeedForward
-from seal_friction_ros.core.estimation.messages import (
-    CONFIGURATION_TYPE,
-    FEEDFORWARD_TYPE,
-    PRESSURE_TYPE,
-    encode,
-    encode_text,
-)
-from seal_friction_ros.core.estimation.records import Pressure
 from seal_friction_ros.core.machine import machine
 from seal_friction_ros.core.machine.machine_snapshot import machine_text, snapshot_of
-from seal_friction_ros.core.machine.newest_messages import TopicMessage, encode_newest
+from seal_friction_ros.core.messages.coder import encode, encode_text
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, FEEDFORWARD_TYPE, PRESSURE_TYPE
+from seal_friction_ros.core.messages.records import FeedForward, Pressure
+from seal_friction_ros.core.messages.together import TopicMessage, encode_newest
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.monitor.live_view import LiveView
 from seal_friction_ros.offline.monitor.node_view import NodeView

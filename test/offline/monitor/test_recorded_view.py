@@ -8,7 +8,7 @@ from harness.closed_loop_bags import write_closed_loop
 from harness.example_bags import rewrite, write_inputs, write_recorded
 from paths import ROOT
 
-from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, PRESSURE_TYPE
+from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE, PRESSURE_TYPE
 from seal_friction_ros.offline.bags.bag import BagError, BagMessage, BagWriter, read_messages
 from seal_friction_ros.offline.bags.recorded_run import read_run
 from seal_friction_ros.offline.monitor.actuator_view import COLUMNS, serious_words

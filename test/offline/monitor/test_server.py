@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from seal_friction_ros.core.estimation.records import NO_ESTIMATE, Velocity
+from seal_friction_ros.core.messages.records import NO_ESTIMATE, Velocity
 from seal_friction_ros.offline.monitor.actuator_view import COLUMNS
 from seal_friction_ros.offline.monitor.live_view import Answer, LiveView
 from seal_friction_ros.offline.monitor.node_view import NodeView

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from paths import ROOT
 
-from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, VELOCITY_TYPE, decode
 from seal_friction_ros.core.friction.states import SLIDING
+from seal_friction_ros.core.messages.coder import decode
+from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE, VELOCITY_TYPE
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.bags.bag import read_messages
 from seal_friction_ros.offline.commands.main import main

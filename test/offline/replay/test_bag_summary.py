@@ -8,11 +8,12 @@ from harness.example_bags import rewrite
 from harness.simulated_day import SECOND, Day, write_day
 from paths import ROOT
 
-from seal_friction_ros.core.estimation.messages import PRESSURE_TYPE, encode
-from seal_friction_ros.core.estimation.records import Pressure
 from seal_friction_ros.core.friction.actuator import actuator_friction
 from seal_friction_ros.core.friction.mounting import CHAMBERS
 from seal_friction_ros.core.friction.seal_file import mount_seals
+from seal_friction_ros.core.messages.coder import encode
+from seal_friction_ros.core.messages.layouts import PRESSURE_TYPE
+from seal_friction_ros.core.messages.records import Pressure
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.bags.bag import BagError
 from seal_friction_ros.offline.replay.bag_parts import Chosen

@@ -10,7 +10,8 @@ from harness.compensation import compensating
 from harness.example_bags import STEP, rewrite, write_recorded
 from paths import ROOT
 
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, ESTIMATE_TYPE
+from seal_friction_ros.core.messages.coder import DECODERS
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, ESTIMATE_TYPE
 from seal_friction_ros.offline.bags.bag import BagMessage, bag_topics, read_messages
 from seal_friction_ros.offline.commands.main import main
 

@@ -22,14 +22,8 @@ from paths import ROOT
 
 from seal_friction_ros.core.estimation.configuration import Configuration
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
-from seal_friction_ros.core.estimation.message_blocks import Kind, UnsuitedError
-from seal_friction_ros.core.estimation.messages import (
-    CONFIGURATION_TYPE,
-    ESTIMATE_TYPE,
-    FORCE_TYPE,
-    GROWN,
-    VELOCITY_TYPE,
-)
+from seal_friction_ros.core.messages.blocks import Kind, UnsuitedError
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, ESTIMATE_TYPE, FORCE_TYPE, GROWN, VELOCITY_TYPE
 from seal_friction_ros.files import load_configuration
 from seal_friction_ros.offline.bags.actuator_bag import find_topics
 from seal_friction_ros.offline.bags.bag import (

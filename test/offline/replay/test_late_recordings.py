@@ -10,19 +10,17 @@ from harness.compensation import SCALE, compensating
 from harness.example_bags import as_recorded, rewrite
 from harness.machines import EXCAVATOR, made, message
 
-from seal_friction_ros.core.estimation.messages import (
+from seal_friction_ros.core.machine import machine as m
+from seal_friction_ros.core.machine.machine_snapshot import machine_text, snapshot_of
+from seal_friction_ros.core.messages.coder import decode, decode_text, encode_text
+from seal_friction_ros.core.messages.layouts import (
     CLOCK_TYPE,
     CONFIGURATION_TYPE,
     ESTIMATE_TYPE,
     FEEDFORWARD_TYPE,
     INPUTS,
-    decode,
-    decode_text,
-    encode_text,
 )
-from seal_friction_ros.core.estimation.records import Status
-from seal_friction_ros.core.machine import machine as m
-from seal_friction_ros.core.machine.machine_snapshot import machine_text, snapshot_of
+from seal_friction_ros.core.messages.records import Status
 from seal_friction_ros.offline.bags.actuator_bag import find_topics, open_actuator
 from seal_friction_ros.offline.bags.bag import BagMessage, BagWriter, read_messages
 from seal_friction_ros.offline.replay.compiled_replay import replay_in_bulk

@@ -9,15 +9,10 @@ from harness.example_bags import rewrite
 from harness.machines import BENCH, EXCAVATOR, made, message
 
 from seal_friction_ros.core.estimation.configuration import ALGORITHM_VERSION
-from seal_friction_ros.core.estimation.messages import (
-    CONFIGURATION_TYPE,
-    FEEDFORWARD_TYPE,
-    decode,
-    decode_text,
-    encode_text,
-)
 from seal_friction_ros.core.machine import machine as m
 from seal_friction_ros.core.machine.machine_snapshot import machine_text, parse_machine_text, snapshot_of
+from seal_friction_ros.core.messages.coder import decode, decode_text, encode_text
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, FEEDFORWARD_TYPE
 from seal_friction_ros.offline.bags.actuator_bag import RECORDED
 from seal_friction_ros.offline.bags.bag import STATE_TYPE, BagMessage, BagWriter, read_messages
 from seal_friction_ros.offline.bags.info import bag_info

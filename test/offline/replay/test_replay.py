@@ -10,14 +10,9 @@ from paths import ROOT
 
 from seal_friction_ros.core.estimation.configuration import ALGORITHM_VERSION
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
-from seal_friction_ros.core.estimation.messages import (
-    CONFIGURATION_TYPE,
-    ESTIMATE_TYPE,
-    decode,
-    decode_text,
-    encode_text,
-)
-from seal_friction_ros.core.estimation.records import Status
+from seal_friction_ros.core.messages.coder import decode, decode_text, encode_text
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, ESTIMATE_TYPE
+from seal_friction_ros.core.messages.records import Status
 from seal_friction_ros.offline.bags.actuator_bag import find_topics
 from seal_friction_ros.offline.bags.bag import ESTIMATE_TOPIC, BagError, BagMessage, BagWriter, read_messages
 from seal_friction_ros.offline.replay.parallel_replay import verify

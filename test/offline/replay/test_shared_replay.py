@@ -13,14 +13,9 @@ from mcap.writer import Writer
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.configuration import ALGORITHM_VERSION
-from seal_friction_ros.core.estimation.message_blocks import Kind
-from seal_friction_ros.core.estimation.messages import (
-    ESTIMATE_TYPE,
-    FORCE_TYPE,
-    VELOCITY_TYPE,
-    decode_text,
-    encode_text,
-)
+from seal_friction_ros.core.messages.blocks import Kind
+from seal_friction_ros.core.messages.coder import decode_text, encode_text
+from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE, FORCE_TYPE, VELOCITY_TYPE
 from seal_friction_ros.offline.bags.actuator_bag import find_topics
 from seal_friction_ros.offline.bags.bag import (
     STATE_TYPE,

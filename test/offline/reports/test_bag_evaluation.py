@@ -10,16 +10,10 @@ import pytest
 
 from seal_friction_ros.core.estimation.configuration import SealSelection, first_snapshot, snapshot_text
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
-from seal_friction_ros.core.estimation.messages import (
-    CONFIGURATION_TYPE,
-    FORCE_TYPE,
-    PRESSURE_TYPE,
-    VELOCITY_TYPE,
-    encode,
-    encode_text,
-)
-from seal_friction_ros.core.estimation.records import Force, Pressure, Status, Velocity
 from seal_friction_ros.core.friction.actuator import actuator_friction
+from seal_friction_ros.core.messages.coder import encode, encode_text
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, FORCE_TYPE, PRESSURE_TYPE, VELOCITY_TYPE
+from seal_friction_ros.core.messages.records import Force, Pressure, Status, Velocity
 from seal_friction_ros.files import load_configuration
 from seal_friction_ros.offline.bags import bag as bags
 from seal_friction_ros.offline.bags.bag import BagWriter

@@ -5,8 +5,9 @@ from pathlib import Path
 import pytest
 from harness.report_page import checked_page
 
-from seal_friction_ros.core.estimation.messages import FORCE_TYPE, PRESSURE_TYPE, VELOCITY_TYPE, encode
-from seal_friction_ros.core.estimation.records import Force, Pressure, Velocity
+from seal_friction_ros.core.messages.coder import encode
+from seal_friction_ros.core.messages.layouts import FORCE_TYPE, PRESSURE_TYPE, VELOCITY_TYPE
+from seal_friction_ros.core.messages.records import Force, Pressure, Velocity
 from seal_friction_ros.offline.bags.bag import FORCE_TOPIC, PRESSURE_TOPIC, VELOCITY_TOPIC, BagWriter
 from seal_friction_ros.offline.replay.replay import replay
 from seal_friction_ros.offline.reports.bag_report import write_report

@@ -12,8 +12,8 @@ from harness.example_bags import rewrite
 
 from seal_friction_ros.core.estimation.configuration import first_snapshot, snapshot_text
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, FEEDFORWARD_TYPE
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, FEEDFORWARD_TYPE
 from seal_friction_ros.core.servo.motions import Chirp, Sine
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun, read_run
 from seal_friction_ros.offline.replay.replay import replay

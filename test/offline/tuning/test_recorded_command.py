@@ -10,29 +10,29 @@ from harness.compensation import compensating
 
 from seal_friction_ros.core.estimation.configuration import first_snapshot, snapshot_text
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
-from seal_friction_ros.core.estimation.messages import (
+from seal_friction_ros.core.foundation.parameters import meanings
+from seal_friction_ros.core.messages.coder import encode, encode_text
+from seal_friction_ros.core.messages.layouts import (
     CONFIGURATION_TYPE,
     FORCE_TYPE,
+    NUMBER_TYPE,
+    NUMBERS_TYPE,
     POSITION_TYPE,
     PRESSURE_TYPE,
     REFERENCE_TYPE,
     VELOCITY_TYPE,
-    encode,
-    encode_text,
 )
-from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
-from seal_friction_ros.core.foundation.parameters import meanings
+from seal_friction_ros.core.messages.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.core.servo import position_servo as servo
 from seal_friction_ros.core.servo.motions import Setpoint, Sine
 from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.commands.main import main
-from seal_friction_ros.offline.tuning.recorded_command import NUMBER, NUMBERS
 
 CONFIGURATION = compensating()
 PLANT = servo.ServoParameters(seals=CONFIGURATION.parameters().estimator.seals, control_period=1e-3)
 ENCODERS = {
-    NUMBER: lambda value: struct.pack('<4xd', value).replace(b'\0\0\0\0', b'\0\1\0\0', 1),
-    NUMBERS: lambda value: b'\0\1\0\0' + struct.pack('<IIIId', 0, 0, 1, 0, value),
+    NUMBER_TYPE: lambda value: struct.pack('<4xd', value).replace(b'\0\0\0\0', b'\0\1\0\0', 1),
+    NUMBERS_TYPE: lambda value: b'\0\1\0\0' + struct.pack('<IIIId', 0, 0, 1, 0, value),
 }
 
 
@@ -65,7 +65,7 @@ def write_axis(path: Path, type_name: str, moves: bool = True, last: bytes = b''
 AREAS = ['--area-a', str(PLANT.cylinder.area_a), '--area-b', str(PLANT.cylinder.area_b)]
 
 
-@pytest.mark.parametrize('type_name', [NUMBER, NUMBERS])
+@pytest.mark.parametrize('type_name', [NUMBER_TYPE, NUMBERS_TYPE])
 def test_tune_says_the_gain_of_the_recorded_command(type_name, tmp_path, capsys):
     bag, out = write_axis(tmp_path / 'bag', type_name), tmp_path / 'f.yaml'
     arguments = ['tune', '--bag', str(bag), '--out', str(out), '--command-topic', '/command', *AREAS, '--json']
@@ -76,7 +76,7 @@ def test_tune_says_the_gain_of_the_recorded_command(type_name, tmp_path, capsys)
 
 
 def test_tune_prints_the_line_of_the_mapping_file_and_writes_for_an_actuator_of_a_machine(tmp_path, capsys):
-    bag, out = write_axis(tmp_path / 'bag', NUMBER), tmp_path / 'f.yaml'
+    bag, out = write_axis(tmp_path / 'bag', NUMBER_TYPE), tmp_path / 'f.yaml'
     arguments = ['--command-topic', '/command', *AREAS, '--actuator', 'boom']
     assert main(['tune', '--bag', str(bag), '--out', str(out), *arguments]) in (0, 1)
     (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith('gain: '))
@@ -95,7 +95,7 @@ def test_tune_prints_the_line_of_the_mapping_file_and_writes_for_an_actuator_of_
     ],
 )
 def test_bag_that_cannot_tell_the_gain_is_rejected_and_nothing_is_written(options, reason, tmp_path, capsys):
-    bag, out = write_axis(tmp_path / 'bag', NUMBER, moves=False), tmp_path / 'f.yaml'
+    bag, out = write_axis(tmp_path / 'bag', NUMBER_TYPE, moves=False), tmp_path / 'f.yaml'
     assert main(['tune', '--bag', str(bag), '--out', str(out), *options]) == 2
     assert reason in capsys.readouterr().err
     assert not out.exists()
@@ -105,7 +105,7 @@ def test_bag_that_cannot_tell_the_gain_is_rejected_and_nothing_is_written(option
     'data', [b'\0', b'\0\1\0\0', b'\0\0\0\0' + bytes(8), b'\0\1\0\0' + struct.pack('<III', 0, 0, 0)]
 )
 def test_malformed_command_is_an_error(data, tmp_path, capsys):
-    bag = write_axis(tmp_path / 'bag', NUMBERS, last=data)
+    bag = write_axis(tmp_path / 'bag', NUMBERS_TYPE, last=data)
     options = ['--command-topic', '/command', *AREAS]
     assert main(['tune', '--bag', str(bag), '--out', str(tmp_path / 'f.yaml'), *options]) == 2
     assert 'message on /command at 6000000000 ns: ' in capsys.readouterr().err

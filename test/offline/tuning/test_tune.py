@@ -13,17 +13,16 @@ from harness.example_bags import rewrite
 from harness.report_page import checked_page
 
 from seal_friction_ros.core.estimation.configuration import Configuration, first_snapshot, snapshot_text
-from seal_friction_ros.core.estimation.messages import (
+from seal_friction_ros.core.messages.coder import encode, encode_text
+from seal_friction_ros.core.messages.layouts import (
     CONFIGURATION_TYPE,
     FORCE_TYPE,
     POSITION_TYPE,
     PRESSURE_TYPE,
     REFERENCE_TYPE,
     VELOCITY_TYPE,
-    encode,
-    encode_text,
 )
-from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
+from seal_friction_ros.core.messages.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.core.servo import position_servo as servo
 from seal_friction_ros.core.servo.closed_loop import with_wrong_friction
 from seal_friction_ros.core.servo.motions import Sine, Step

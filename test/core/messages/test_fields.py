@@ -12,17 +12,15 @@ from hypothesis import strategies as st
 from rclpy.serialization import serialize_message
 
 from seal_friction_ros.core.foundation.documents import DEEPEST
-from seal_friction_ros.core.machine.message_fields import (
-    LARGEST_MESSAGE,
+from seal_friction_ros.core.messages.definitions import (
     Field,
-    Reader,
     definition_of_class,
     full_name,
-    names_in,
     number_paths,
     parse_definition,
     short_name,
 )
+from seal_friction_ros.core.messages.fields import LARGEST_MESSAGE, Reader, names_in
 from seal_friction_ros.offline.bags.definitions import message_definition
 
 INSTALLED = (

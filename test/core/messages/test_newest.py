@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import UInt8MultiArray
 
-from seal_friction_ros.core.machine.newest_messages import TopicMessage, decode_newest, encode_newest
+from seal_friction_ros.core.messages.together import TopicMessage, decode_newest, encode_newest
 
 NAMES = st.text('abc_/é', min_size=0, max_size=12)
 MESSAGES = st.lists(st.builds(TopicMessage, NAMES, NAMES, st.binary(max_size=40)), max_size=6)

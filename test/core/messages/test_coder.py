@@ -12,12 +12,14 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosgraph_msgs.msg import Clock as ClockMessage
 from seal_friction_msgs import msg as messages
 
-from seal_friction_ros.core.estimation import messages as wire
-from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
-from seal_friction_ros.core.estimation.records import (
+from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages import coder, layouts
+from seal_friction_ros.core.messages.records import (
     Clock,
+    FeedForward,
     Force,
     FrictionEstimate,
+    Limited,
     Position,
     Pressure,
     ServoReference,
@@ -26,7 +28,6 @@ from seal_friction_ros.core.estimation.records import (
     Velocity,
     WatchdogTick,
 )
-from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.nodes.managed_node import message_class
 
 DEFINITIONS = ROOT / 'msg_defs' / 'msg'
@@ -34,42 +35,42 @@ STAMP = 1_700_000_000_123_456_789  # [ns]
 ESTIMATE = FrictionEstimate(STAMP, 40.5, 3.25, 45.75, -40.5, FrictionState.SLIDING, -1, 1028, 0.125)
 # Type -> values, and how to encode them.
 SAMPLES = {
-    wire.PRESSURE_TYPE: ({'chamber_a': 3.5e6, 'chamber_b': -1e4}, Pressure(STAMP, 3.5e6, -1e4), wire.encode),
-    wire.FORCE_TYPE: ({'force': -12.5}, Force(STAMP, -12.5), wire.encode),
-    wire.VELOCITY_TYPE: (
+    layouts.PRESSURE_TYPE: ({'chamber_a': 3.5e6, 'chamber_b': -1e4}, Pressure(STAMP, 3.5e6, -1e4), coder.encode),
+    layouts.FORCE_TYPE: ({'force': -12.5}, Force(STAMP, -12.5), coder.encode),
+    layouts.VELOCITY_TYPE: (
         {'velocity': 0.0625},
         Velocity(STAMP, 0.0625, b''),
-        lambda record, frame: wire.encode(record._replace(frame_id=frame)),
+        lambda record, frame: coder.encode(record._replace(frame_id=frame)),
     ),
-    wire.POSITION_TYPE: ({'position': -0.0125}, Position(STAMP, -0.0125), wire.encode),
-    wire.REFERENCE_TYPE: (
+    layouts.POSITION_TYPE: ({'position': -0.0125}, Position(STAMP, -0.0125), coder.encode),
+    layouts.REFERENCE_TYPE: (
         {'position': 0.01, 'velocity': -0.02, 'acceleration': 0.3},
         ServoReference(STAMP, 0.01, -0.02, 0.3),
-        lambda record, frame: wire.encode(record._replace(frame_id=frame)),
+        lambda record, frame: coder.encode(record._replace(frame_id=frame)),
     ),
-    wire.TEMPERATURE_TYPE: (
+    layouts.TEMPERATURE_TYPE: (
         {'temperature': 41.5, 'variance': 0.25},
         Temperature(STAMP, 41.5, 0.25),
-        wire.encode,
+        coder.encode,
     ),
-    wire.TICK_TYPE: (
+    layouts.TICK_TYPE: (
         {'idle_time': 0.25},
         WatchdogTick(STAMP, 0.25),
-        lambda record, frame: wire.encode(record._replace(frame_id=frame)),
+        lambda record, frame: coder.encode(record._replace(frame_id=frame)),
     ),
-    wire.FEEDFORWARD_TYPE: (
+    layouts.FEEDFORWARD_TYPE: (
         {'force': -33.5, 'scale': 0.75, 'limited': 5},
         FeedForward(STAMP, -33.5, 0.75, 5),
-        wire.encode,
+        coder.encode,
     ),
-    wire.ESTIMATE_TYPE: (
+    layouts.ESTIMATE_TYPE: (
         {
             name: int(value) if name == 'state' else value
             for name, value in ESTIMATE._asdict().items()
             if name != 'stamp'
         },
         ESTIMATE,
-        wire.encode,
+        coder.encode,
     ),
 }
 STAMPED = pytest.mark.parametrize('type_name', SAMPLES)
@@ -83,14 +84,14 @@ def clock(nanoseconds: int) -> bytes:
     return serialize_message(message)
 
 
-UNSTAMPED = {wire.CONFIGURATION_TYPE: (str, wire.encode_text('text')), wire.CLOCK_TYPE: (Clock, clock(STAMP))}
+UNSTAMPED = {layouts.CONFIGURATION_TYPE: (str, coder.encode_text('text')), layouts.CLOCK_TYPE: (Clock, clock(STAMP))}
 """Type without a header -> what its decoder makes, and a message."""
 
 
 def make_store():
     store = get_typestore(Stores.ROS2_JAZZY)
     for path in sorted(DEFINITIONS.glob('*.msg')):
-        store.register(get_types_from_msg(path.read_text(), f'{wire.PACKAGE}/msg/{path.stem}'))
+        store.register(get_types_from_msg(path.read_text(), f'{layouts.PACKAGE}/msg/{path.stem}'))
     return store
 
 
@@ -117,7 +118,7 @@ def encode(type_name: str, frame: bytes = b'') -> bytes:
 
 def decoded(type_name: str, frame: bytes):
     record = SAMPLES[type_name][1]
-    with_frame = (wire.VELOCITY_TYPE, wire.REFERENCE_TYPE, wire.TICK_TYPE)
+    with_frame = (layouts.VELOCITY_TYPE, layouts.REFERENCE_TYPE, layouts.TICK_TYPE)
     return record._replace(frame_id=frame) if type_name in with_frame else record
 
 
@@ -141,13 +142,13 @@ def test_rclpy_reads_what_is_written_for_every_frame_name_length(type_name):
 def test_what_rclpy_writes_is_read_for_every_frame_name_length(type_name):
     for frame in FRAMES:
         data = serialize_message(as_rclpy(type_name, frame))
-        assert wire.DECODERS[type_name](data) == decoded(type_name, frame)
+        assert coder.DECODERS[type_name](data) == decoded(type_name, frame)
 
 
 @STAMPED
 def test_decoding_undoes_encoding_for_every_frame_name_length(type_name):
     for frame in FRAMES:
-        assert wire.DECODERS[type_name](encode(type_name, frame)) == decoded(type_name, frame)
+        assert coder.DECODERS[type_name](encode(type_name, frame)) == decoded(type_name, frame)
 
 
 @STAMPED
@@ -156,15 +157,15 @@ def test_padding_is_zero(type_name):
     ones = struct.unpack('<d', b'\x01' * 8)[0]
     stamp = 0x01010101 * 10**9 + 0x01010101
     records = {
-        wire.PRESSURE_TYPE: Pressure(stamp, ones, ones),
-        wire.FORCE_TYPE: Force(stamp, ones),
-        wire.VELOCITY_TYPE: Velocity(stamp, ones, b''),
-        wire.POSITION_TYPE: Position(stamp, ones),
-        wire.REFERENCE_TYPE: ServoReference(stamp, ones, ones, ones),
-        wire.TEMPERATURE_TYPE: Temperature(stamp, ones, ones),
-        wire.TICK_TYPE: WatchdogTick(stamp, ones),
-        wire.FEEDFORWARD_TYPE: FeedForward(stamp, ones, ones, 0x01010101),
-        wire.ESTIMATE_TYPE: FrictionEstimate(stamp, *[ones] * 4, FrictionState.SLIDING, 1, 0x01010101, *[ones] * 5),
+        layouts.PRESSURE_TYPE: Pressure(stamp, ones, ones),
+        layouts.FORCE_TYPE: Force(stamp, ones),
+        layouts.VELOCITY_TYPE: Velocity(stamp, ones, b''),
+        layouts.POSITION_TYPE: Position(stamp, ones),
+        layouts.REFERENCE_TYPE: ServoReference(stamp, ones, ones, ones),
+        layouts.TEMPERATURE_TYPE: Temperature(stamp, ones, ones),
+        layouts.TICK_TYPE: WatchdogTick(stamp, ones),
+        layouts.FEEDFORWARD_TYPE: FeedForward(stamp, ones, ones, 0x01010101),
+        layouts.ESTIMATE_TYPE: FrictionEstimate(stamp, *[ones] * 4, FrictionState.SLIDING, 1, 0x01010101, *[ones] * 5),
     }
     for length in range(41):
         data = SAMPLES[type_name][2](records[type_name], b'\x01' * length)
@@ -173,7 +174,7 @@ def test_padding_is_zero(type_name):
         body = 4 + -(-(end_of_name + 1 - 4) // 8) * 8
         assert data[16:end_of_name] == b'\x01' * length
         assert data[end_of_name:body] == bytes(body - end_of_name)
-        holes = 2 if type_name == wire.ESTIMATE_TYPE else 0
+        holes = 2 if type_name == layouts.ESTIMATE_TYPE else 0
         assert data[body:].count(0) == holes
 
 
@@ -182,7 +183,7 @@ def test_padding_is_zero(type_name):
 def test_every_number_survives_nan_and_infinity_included(type_name, value, stamp, frame):
     _, record, encoder = SAMPLES[type_name]
     name = record._fields[1]
-    back = wire.DECODERS[type_name](encoder(record._replace(stamp=stamp, **{name: value}), frame))
+    back = coder.DECODERS[type_name](encoder(record._replace(stamp=stamp, **{name: value}), frame))
     assert back.stamp == stamp
     assert struct.pack('<d', getattr(back, name)) == struct.pack('<d', value)
 
@@ -191,17 +192,17 @@ def test_every_number_survives_nan_and_infinity_included(type_name, value, stamp
 @example('')
 @example('{"source": "μ = c Fₙ⁻ⁿ"}')
 def test_a_text_survives_and_is_what_rosbags_writes(text):
-    data = wire.encode_text(text)
-    assert wire.decode_text(data) == text
-    message = STORE.types[wire.CONFIGURATION_TYPE](text)
-    assert data == bytes(STORE.serialize_cdr(message, wire.CONFIGURATION_TYPE))
+    data = coder.encode_text(text)
+    assert coder.decode_text(data) == text
+    message = STORE.types[layouts.CONFIGURATION_TYPE](text)
+    assert data == bytes(STORE.serialize_cdr(message, layouts.CONFIGURATION_TYPE))
 
 
 @pytest.mark.parametrize('text', ['', 'a', 'ab', 'abc', 'abcd', 'μ'])
 def test_rclpy_and_we_read_each_others_texts(text):
     message = messages.EstimatorConfiguration(json=text)
-    assert deserialize_message(wire.encode_text(text), messages.EstimatorConfiguration) == message
-    assert wire.decode_text(serialize_message(message)) == text
+    assert deserialize_message(coder.encode_text(text), messages.EstimatorConfiguration) == message
+    assert coder.decode_text(serialize_message(message)) == text
 
 
 @given(st.integers(-(2**31) * 10**9, 2**31 * 10**9 - 1))
@@ -209,9 +210,9 @@ def test_rclpy_and_we_read_each_others_texts(text):
 @example(-1)
 def test_simulated_time_is_what_rclpy_and_rosbags_write(nanoseconds):
     data = clock(nanoseconds)
-    assert wire.decode_clock(data) == Clock(nanoseconds)
+    assert coder.decode_clock(data) == Clock(nanoseconds)
     time = STORE.types['builtin_interfaces/msg/Time'](*divmod(nanoseconds, 10**9))
-    assert data == bytes(STORE.serialize_cdr(STORE.types[wire.CLOCK_TYPE](time), wire.CLOCK_TYPE))
+    assert data == bytes(STORE.serialize_cdr(STORE.types[layouts.CLOCK_TYPE](time), layouts.CLOCK_TYPE))
 
 
 # --- nothing else is taken ---
@@ -219,12 +220,12 @@ def test_simulated_time_is_what_rclpy_and_rosbags_write(nanoseconds):
 
 def decode_or_refuse(type_name: str, data: bytes):
     try:
-        return wire.DECODERS[type_name](data)
+        return coder.DECODERS[type_name](data)
     except ValueError:  # and nothing but a ValueError
         return None
 
 
-@pytest.mark.parametrize('type_name', wire.DECODERS)
+@pytest.mark.parametrize('type_name', coder.DECODERS)
 @given(data=st.binary(max_size=150))
 def test_garbage_is_refused_with_a_value_error_or_is_the_record_of_its_type(type_name, data):
     if not data.startswith(b'\x00\x01'):
@@ -243,17 +244,17 @@ def test_a_damaged_message_is_refused_with_a_value_error_or_has_the_size_of_one(
     shortened = bytes(data[: len(data) - cut])
     if decode_or_refuse(type_name, shortened) is not None:
         # A damaged name length may move the end within the padding, no further: of the message, or as it was.
-        assert cut <= 7 or wire.GROWN[type_name] - 10 <= cut <= wire.GROWN[type_name] + 7
+        assert cut <= 7 or layouts.GROWN[type_name] - 10 <= cut <= layouts.GROWN[type_name] + 7
 
 
 @STAMPED
 def test_every_truncation_is_refused(type_name):
     data = encode(type_name, b'rod')
-    grown = wire.GROWN[type_name]
+    grown = layouts.GROWN[type_name]
     as_it_was = range(len(data) - grown, len(data) - grown + 4) if grown else ()
     for length in set(range(len(data))).difference(as_it_was):
         with pytest.raises(ValueError, match='bytes'):
-            wire.DECODERS[type_name](data[:length])
+            coder.DECODERS[type_name](data[:length])
 
 
 START = 1_700_000_000_000_000_000  # [ns]
@@ -261,8 +262,8 @@ START = 1_700_000_000_000_000_000  # [ns]
 
 def test_an_estimate_from_before_the_adaptation_is_read_with_nothing_learnt():
     estimate = FrictionEstimate(START, 40.0, 4.0, 45.0, 40.0, FrictionState.SLIDING, 1, 0, 0.001, 1.2, 0.01, 5.0, -1.0)
-    data = wire.encode(estimate, b'rod')
-    assert wire.decode(wire.ESTIMATE_TYPE, data[:-32]) == (*estimate[:9], 1.0, 0.0, 0.0, 0.0)
+    data = coder.encode(estimate, b'rod')
+    assert coder.decode(layouts.ESTIMATE_TYPE, data[:-32]) == (*estimate[:9], 1.0, 0.0, 0.0, 0.0)
 
 
 @STAMPED
@@ -278,42 +279,42 @@ def test_messages_of_other_types_are_refused(type_name):
     for other in SAMPLES:
         if sizes[other] != sizes[type_name]:
             with pytest.raises(ValueError, match='bytes where the message has'):
-                wire.DECODERS[type_name](encode(other))
+                coder.DECODERS[type_name](encode(other))
 
 
 @pytest.mark.parametrize('encapsulation', [b'\x00\x00', b'\x00\x03', b'\x00\x07', b'\x01\x00', b'\xff\xff'])
-@pytest.mark.parametrize('type_name', wire.DECODERS)
+@pytest.mark.parametrize('type_name', coder.DECODERS)
 def test_another_encapsulation_is_refused(type_name, encapsulation):
     data = encode(type_name) if type_name in SAMPLES else UNSTAMPED[type_name][1]
     with pytest.raises(ValueError, match='little-endian CDR'):
-        wire.DECODERS[type_name](encapsulation + data[2:])
+        coder.DECODERS[type_name](encapsulation + data[2:])
 
 
 def test_a_time_that_is_none_is_refused():
     data = clock(STAMP)
     for length in range(len(data)):
         with pytest.raises(ValueError, match=f'^{length} bytes are not a time'):
-            wire.decode_clock(data[:length])
+            coder.decode_clock(data[:length])
     for surplus, taken in ((1, True), (3, True), (4, False), (100, False)):
-        assert (decode_or_refuse(wire.CLOCK_TYPE, data + bytes(surplus)) is not None) is taken
+        assert (decode_or_refuse(layouts.CLOCK_TYPE, data + bytes(surplus)) is not None) is taken
     with pytest.raises(ValueError, match='1000000000 ns is not valid'):
-        wire.decode_clock(data[:8] + (10**9).to_bytes(4, 'little'))
+        coder.decode_clock(data[:8] + (10**9).to_bytes(4, 'little'))
 
 
 @pytest.mark.parametrize('state', [4, 5, 255])
 def test_a_friction_state_that_is_none_is_refused(state):
-    data = bytearray(wire.encode(ESTIMATE))
+    data = bytearray(coder.encode(ESTIMATE))
     place = data.index(bytes([FrictionState.SLIDING, 255]))
     data[place] = state
     with pytest.raises(ValueError, match=f'{state} is not a valid FrictionState'):
-        wire.decode(wire.ESTIMATE_TYPE, bytes(data))
+        coder.decode(layouts.ESTIMATE_TYPE, bytes(data))
 
 
 @pytest.mark.parametrize(('nanoseconds', 'length'), [(10**9, 1), (0, 1025), (0, 2**32 - 1)])
 def test_a_header_that_makes_no_sense_is_refused(nanoseconds, length):
     data = struct.pack('<4siII', b'\x00\x01\x00\x00', 0, nanoseconds, length) + bytes(12)
     with pytest.raises(ValueError, match='is not valid'):
-        wire.decode(wire.FORCE_TYPE, data)
+        coder.decode(layouts.FORCE_TYPE, data)
 
 
 @pytest.mark.parametrize(
@@ -328,7 +329,7 @@ def test_a_header_that_makes_no_sense_is_refused(nanoseconds, length):
 )
 def test_a_text_that_is_none_is_refused(data):
     with pytest.raises(ValueError):
-        wire.decode_text(data)
+        coder.decode_text(data)
 
 
 # --- the message definition ---
@@ -362,7 +363,7 @@ def test_the_generated_message_has_the_constants_of_the_code():
 CODES = {'double': 'd', 'uint8': 'B', 'int8': 'b', 'uint32': 'I'}
 
 
-@pytest.mark.parametrize('layout', wire.LAYOUTS, ids=lambda layout: layout.record.__name__)
+@pytest.mark.parametrize('layout', layouts.LAYOUTS, ids=lambda layout: layout.record.__name__)
 def test_the_table_of_layouts_is_that_of_the_generated_messages(layout):
     generated = message_class(layout.message_type).get_fields_and_field_types()
     kinds = dict(zip(layout.fields, layout.codes, strict=True))
@@ -372,11 +373,10 @@ def test_the_table_of_layouts_is_that_of_the_generated_messages(layout):
 
 def test_an_empty_frame_name_without_its_end_is_understood():
     data = struct.pack('<4siII4xd', b'\x00\x01\x00\x00', 3, 4, 0, 0.5)
-    assert wire.decode(wire.VELOCITY_TYPE, data) == Velocity(3_000_000_004, 0.5, b'')
+    assert coder.decode(layouts.VELOCITY_TYPE, data) == Velocity(3_000_000_004, 0.5, b'')
 
 
-@pytest.mark.parametrize('layout', wire.LAYOUTS, ids=lambda layout: layout.message_type)
-def test_the_size_of_a_message_is_that_of_its_numbers_and_the_padding_between_them(layout):
-    assert layout.size == struct.calcsize('<' + layout.body())
+@pytest.mark.parametrize('layout', layouts.LAYOUTS, ids=lambda layout: layout.message_type)
+def test_every_number_of_a_message_is_aligned_to_its_size(layout):
     assert layout.offsets[0] == 0
     assert all(offset % struct.calcsize(code) == 0 for offset, code in zip(layout.offsets, layout.codes, strict=True))

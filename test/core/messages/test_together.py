@@ -6,10 +6,9 @@ from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message
 from seal_friction_msgs.msg import MachineFriction
 
-from seal_friction_ros.core.estimation.feedforward import FeedForward
-from seal_friction_ros.core.estimation.messages import LAYOUTS, SECOND
-from seal_friction_ros.core.estimation.records import FrictionEstimate
-from seal_friction_ros.core.machine.answers_together import NamedAnswer, decode_together, encode_together
+from seal_friction_ros.core.messages.layouts import LAYOUTS, SECOND
+from seal_friction_ros.core.messages.records import FeedForward, FrictionEstimate
+from seal_friction_ros.core.messages.together import NamedAnswer, decode_together, encode_together
 
 NUMBERS = {
     'd': st.floats(allow_nan=False),
@@ -79,7 +78,7 @@ def test_the_message_has_the_stamp_of_its_first_answer_and_no_frame_name(answers
     assert data[12:17] == b'\x01\x00\x00\x00\x00'  # the length of an empty text is that of its end
 
 
-@pytest.mark.parametrize('head', [b'\x00\x00\x00\x00', b'\x00\x01\x00\x01', b'\x00\x03\x00\x00', b''])
+@pytest.mark.parametrize('head', [b'\x00\x00\x00\x00', b'\x01\x01\x00\x00', b'\x00\x03\x00\x00', b''])
 def test_another_encapsulation_is_refused(head):
     with pytest.raises(ValueError, match=f'encapsulation {head.hex()} is not little-endian CDR'):
         decode_together(head + bytes(40) if head else b'')

@@ -1,0 +1,1 @@
+"""The messages: records, layouts, and the one coder of their bytes (CDR). No other room knows where a number stands."""
