@@ -12,16 +12,9 @@ from hypothesis import strategies as st
 from rclpy.serialization import serialize_message
 
 from seal_friction_ros.core.foundation.documents import DEEPEST
-from seal_friction_ros.core.messages.definitions import (
-    Field,
-    definition_of_class,
-    full_name,
-    number_paths,
-    parse_definition,
-    short_name,
-)
+from seal_friction_ros.core.messages.definitions import Field, full_name, number_paths, parse_definition, short_name
 from seal_friction_ros.core.messages.fields import LARGEST_MESSAGE, Reader, names_in
-from seal_friction_ros.offline.bags.definitions import message_definition
+from seal_friction_ros.offline.bags.bag import message_definition
 
 INSTALLED = (
     'seal_friction_msgs/msg/RodVelocity',
@@ -50,12 +43,12 @@ def message_class(type_name: str):
     return getattr(importlib.import_module(f'{package}.msg'), name)
 
 
-def of_class(type_name: str):
-    return definition_of_class(type_name, lambda kind: message_class(kind).get_fields_and_field_types())
+def installed(type_name: str):
+    return parse_definition(type_name, message_definition(type_name)[0])
 
 
 def reader_of(type_name: str, *paths: str) -> Reader:
-    return Reader(of_class(type_name), type_name, paths)
+    return Reader(installed(type_name), type_name, paths)
 
 
 def random_message(draw, type_name: str):
@@ -110,7 +103,7 @@ def numbers_of(message, above: str = ''):
 @settings(max_examples=20)
 @given(st.data())
 def test_every_number_of_every_type_is_the_one_that_rclpy_wrote(type_name, data):
-    definition = of_class(type_name)
+    definition = installed(type_name)
     reader = None
     for _ in range(3):  # the places of the first message are not those of the next
         message = random_message(data.draw, type_name)
@@ -123,12 +116,6 @@ def test_every_number_of_every_type_is_the_one_that_rclpy_wrote(type_name, data)
             stamp = message.header.stamp
             assert (read.stamp or 0) == stamp.sec * 1_000_000_000 + stamp.nanosec
             assert read.frame_id == message.header.frame_id.encode()
-
-
-@pytest.mark.parametrize('type_name', INSTALLED)
-def test_the_text_in_a_bag_and_the_installed_class_define_the_same_message(type_name):
-    text, _ = message_definition(type_name)
-    assert dict(parse_definition(type_name, text)) == dict(of_class(type_name))
 
 
 @given(st.lists(NAMES, min_size=1, max_size=6, unique=True), st.data())
@@ -315,9 +302,9 @@ def test_a_chained_controller_is_read_by_the_name_of_its_joint():
 
 def test_the_paths_of_all_numbers_are_listed():
     assert 'wrench.force.z' in number_paths(
-        of_class('geometry_msgs/msg/WrenchStamped'), 'geometry_msgs/msg/WrenchStamped'
+        installed('geometry_msgs/msg/WrenchStamped'), 'geometry_msgs/msg/WrenchStamped'
     )
-    assert 'velocity[]' in number_paths(of_class(JOINT_STATE), JOINT_STATE)
+    assert 'velocity[]' in number_paths(installed(JOINT_STATE), JOINT_STATE)
 
 
 # -- definitions and paths, by hand -----------------------------------------------------------------------------------
@@ -378,17 +365,6 @@ def test_a_message_without_fields_is_one_byte():
 def test_a_type_has_a_short_and_a_full_name():
     assert short_name('a/msg/B') == short_name('a/B') == 'a/B'
     assert full_name('a/msg/B') == full_name('a/B') == 'a/msg/B'
-
-
-@pytest.mark.parametrize('kind', ['float64[x]', 'set<double>', ''])
-def test_a_field_of_a_class_with_an_unknown_form_is_named(kind):
-    with pytest.raises(ValueError, match='field speed has the unknown type'):
-        definition_of_class('a/A', lambda _: {'speed': kind})
-
-
-def test_a_field_of_a_class_with_an_unknown_kind_is_named():
-    with pytest.raises(ValueError, match='a/A: speed of a/A has the unknown type quaternion'):
-        definition_of_class('a/A', lambda _: {'speed': 'quaternion'})
 
 
 LISTS = 'string[] others\nstring[] joint_names\nstring[] name\nfloat64[] values\nfloat64[2] pair\n'
@@ -487,9 +463,9 @@ def test_numbers_that_are_missing_leave_the_others_in_their_places():
 
 def test_the_names_of_the_elements_of_a_message_are_found():
     joints = serialize_message(message_class(JOINT_STATE)(name=['a', 'boom'], position=[1.0, 2.0]))
-    assert names_in(of_class(JOINT_STATE), JOINT_STATE, joints) == ['a', 'boom']
+    assert names_in(installed(JOINT_STATE), JOINT_STATE, joints) == ['a', 'boom']
     kind = 'std_msgs/msg/Float64MultiArray'
-    assert names_in(of_class(kind), kind, serialize_message(message_class(kind)(data=[1.0]))) == []
+    assert names_in(installed(kind), kind, serialize_message(message_class(kind)(data=[1.0]))) == []
 
 
 @pytest.mark.parametrize(('surplus', 'is_read'), [(0, True), (3, True), (4, False)])
