@@ -69,7 +69,7 @@ def test_stamps_of_1970_are_marked_and_warned_of():
     with graph({'stamp_age_max': EstimatorSettings().stamp_age_max}) as g:
         g.connect()
         assert g.estimate(SECOND, 0.1).status == FrictionEstimate.STAMP_AGE
-        assert g.spin_until(lambda: g.probe.values('estimate').get('message') == 'STAMP_AGE')
+        assert g.spin_until(lambda: 'STAMP_AGE' in g.probe.values('estimate').get('message', ''))
         assert g.probe.values('estimate')['level'] == '1'
         assert g.estimate(time.time_ns(), 0.1).status == 0
 

@@ -143,7 +143,7 @@ def test_a_topic_that_no_input_uses_is_recorded_and_the_bag_replays_to_the_byte(
     text = EXCAVATOR.replace('topics: {', 'topics: {/valve: std_msgs/msg/Float64MultiArray, ', 1)
     with machine(tmp_path, text, **recording) as (nodes, node, drivers):
         valve = drivers.create_publisher(Float64MultiArray, '/valve', 10)
-        heard(nodes, node, drivers)
+        heard(nodes, drivers)
         for number in range(5):
             valve.publish(Float64MultiArray(data=[float(number)]))
             move(nodes, drivers, 1)
@@ -168,7 +168,7 @@ def test_a_joint_that_no_message_holds_is_named_and_the_others_go_on(tmp_path):
 
 def test_an_input_whose_messages_are_empty_has_not_arrived(tmp_path, capfd):
     with machine(tmp_path) as (nodes, node, drivers):
-        heard(nodes, node, drivers)
+        heard(nodes, drivers)
         remarks = ''
 
         def said(words: str) -> bool:

@@ -107,4 +107,4 @@ def test_edge_lies_where_the_square_of_the_stress_vanishes():
 
 
 def test_width_of_a_contact_is_the_distance_of_its_edges():
-    assert WallContact(np.zeros(0), np.zeros(0), 0.0, 0.0, (1.0, 3.5)).width == 2.5
+    assert WallContact(np.zeros(0), np.zeros(0), 0.0, 0.0, 0.0, (1.0, 3.5)).width == 2.5
