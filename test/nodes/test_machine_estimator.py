@@ -167,7 +167,7 @@ def test_a_joint_that_no_message_holds_is_named_and_the_others_go_on(tmp_path):
 
 
 def test_an_input_whose_messages_are_empty_has_not_arrived(tmp_path, capfd):
-    with machine(tmp_path) as (nodes, node, drivers):
+    with machine(tmp_path) as (nodes, _, drivers):
         heard(nodes, drivers)
         remarks = ''
 
