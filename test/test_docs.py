@@ -217,7 +217,7 @@ def test_services_named_in_the_readme_are_those_of_the_node():
     (call,) = (line for line in commands(' ros') if line.startswith('ros2 service call'))
     source = (ROOT / 'seal_friction_ros' / 'nodes' / 'estimator_node.py').read_text()
     assert call.split()[3] == '/left_actuator/friction_estimator/start_recording'
-    assert "'start_recording': " in source
+    assert "('start_recording', " in source
     assert "create_service(Trigger, f'~/{service}'" in source
     assert call.split()[4] == 'std_srvs/srv/Trigger'
 

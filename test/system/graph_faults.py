@@ -24,7 +24,7 @@ from rosgraph_msgs.msg import Clock
 from seal_friction_msgs.msg import CylinderPressure, FrictionEstimate, RodVelocity
 from std_msgs.msg import Float64
 
-from seal_friction_ros.core.estimation import records
+from seal_friction_ros.core.messages import records
 from seal_friction_ros.core.messages.records import FeedForward, Status
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator

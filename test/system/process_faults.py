@@ -20,7 +20,7 @@ from harness.processes import free_domain, node_process
 from harness.spin_nodes import TIMEOUT, SpunNodes, ros_context
 from rclpy.context import Context
 
-from seal_friction_ros.core.estimation import records
+from seal_friction_ros.core.messages import records
 from seal_friction_ros.core.messages.coder import decode
 from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE, INPUTS
 from seal_friction_ros.offline.bags.bag import BagError, read_messages

@@ -39,7 +39,8 @@ MODES = ('off', 'observe', 'on')
 ONE_SIDED_95 = 1.644854  # [-] 95 % of a normal distribution are below it
 LAG = 0.005  # [s] time constant of each of the two lags of all signals, with which the acceleration is taken
 LEAST_FRICTION = 1e-3  # [N] of the law, below which there is nothing to learn
-SETTLED = 0.99  # [-] of the friction, which its lagging value must have reached after a reversal
+SETTLED = 0.99  # [-] of the friction, which its lagging value must have reached after a reversal,
+JUMPED = 1.1  # [-] of it that the lagging value must not exceed after a pressure that the law does not know
 LARGEST_INERTIA = 0.5  # [-] of the friction, in a reading with a known mass: the mass may be wrong
 LONGEST_STEP = 0.1  # [s] after a longer gap the acceleration starts anew
 LEARNING_INTERVAL = 8_000_000  # [ns] least time between two samples that are learnt from: what it costs at 1 kHz
@@ -213,7 +214,8 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
         if slide.is_identified and known.stamp != NEVER:
             missed = _missed(settings, state, newest, abs(velocity)) / known.innovation_std
             bias += elapsed / (elapsed + SHORT_TIME) * (between(-IMPLAUSIBLE, missed, IMPLAUSIBLE) - bias)
-        if twice.friction * direction >= SETTLED * friction >= LEAST_FRICTION:
+        most = JUMPED if slide.is_identified and not strokes.present.is_identified else math.inf
+        if most * friction >= twice.friction * direction >= SETTLED * friction >= LEAST_FRICTION:
             force, law = twice.force_sum - settings.moving_mass * acceleration, twice.friction * direction
             reading = Reading(slide.stamp, force, direction, twice.velocity, way, law, slide.friction_std)
             strokes = _with_reading(strokes, reading, slide.is_identified)
