@@ -45,7 +45,10 @@ DATA_ARROWS = (  # from, to, colour
     ((3.35, 5.73), (3.35, 5.34), style.BLUE),
     ((3.35, 4.81), (3.35, 4.42), style.BLUE),
 )
-CORE_ROOMS = ('tuning', 'servo', 'estimation, identification,\noring_contact, lubrication', 'friction', 'foundation')
+CORE_ROOMS = (
+    'tuning', 'servo, machine', 'estimation, identification,\noring_contact, lubrication', 'messages, friction',
+    'foundation',
+)  # fmt: skip
 OFFLINE_ROOMS = ('commands', 'reports', 'identification, tuning,\ncontact, monitor', 'replay', 'bags', 'work')
 
 

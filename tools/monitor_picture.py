@@ -34,7 +34,7 @@ def draw_monitor(path: Path) -> None:
         with (
             node_process('servo_simulator', domain, {**SEALS, **MOTION}, log, parameter_file=simulator),
             node_process('friction_estimator', domain, {**SEALS, 'adaptation.mode': 'observe'}, log),
-            monitor(domain) as (_, url),
+            monitor(domain) as watching,
             browser(folder) as page,
         ):
             end = time.monotonic() + PATIENCE
@@ -44,7 +44,7 @@ def draw_monitor(path: Path) -> None:
                 time.sleep(0.1)
             page.size(*SIZE)
             page.call('Emulation.setScrollbarsHidden', hidden=True)
-            page.open(url)
+            page.open(watching.url)
             page.wait_for('columns.error && columns.error.filter((value) => value !== null).length > 1500')
             page.wait_for(UNDISTURBED)
             page.screenshot(path)
