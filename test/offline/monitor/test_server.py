@@ -105,7 +105,11 @@ def test_without_the_token_everything_is_403(path: str, body: Any, token: str):
 def test_another_page_is_refused_even_with_the_token(path: str, body: Any, headers: dict[str, str]):
     switched: list[Any] = []
     with served(view_of(change=lambda wanted: switched.append(wanted) or [])) as server:
-        assert ask(server, path, body=body, **headers)[0] in (REFUSED if 'Host' in headers else (403,))
+        try:
+            status = ask(server, path, body=body, **headers)[0]
+        except ConnectionError:  # closed before it took the body: what is no request at all gets no answer
+            status = REFUSED[0]
+        assert status in (REFUSED if 'Host' in headers else (403,))
     assert not switched
 
 
