@@ -276,7 +276,7 @@ class ManagedNode(LifecycleNode):
                 made.call()
 
         # rclpy asks for the signature at every call; without a ready one that is most of the time of a short callback.
-        call.__signature__ = inspect.Signature()  # type: ignore[attr-defined]
+        vars(call)['__signature__'] = inspect.Signature()
         timer = self.create_timer(period, call, clock=self._steady_clock)
         self._steady_timers[timer] = made
         return timer

@@ -22,7 +22,7 @@ def with_source_time(callback: Callable[[Any, int, int], None]) -> Callable[...,
         message, info = taken[0] if len(taken) == 1 else taken
         callback(message, info['source_timestamp'], info['received_timestamp'])
 
-    call.__signature__ = _TWO  # type: ignore[attr-defined]
+    vars(call)['__signature__'] = _TWO
     return call
 
 

@@ -100,14 +100,16 @@ def test_what_waited_while_the_node_was_held_up_makes_no_force_and_replays_to_th
         assert rod.forces_since(min(waited))[0] == 0.0
         assert rod.g.spin_until(lambda: rod.move(-SPEED) < -PUSH)
         rod.g.estimator.finish()
-    is_late, answered_late, longest = False, set(), round(FeedForwardSettings().lateness_max * 1e9)
+    is_late, recorded, longest = False, set(), round(FeedForwardSettings().lateness_max * 1e9)
     for message in read_messages(tmp_path / 'bag'):
         if message.type_name == VELOCITY_TYPE:
             is_late = message.log_time - message.publish_time > longest
-            answered_late |= {decode(VELOCITY_TYPE, message.data).stamp} & waited if is_late else set()
+            stamp = decode(VELOCITY_TYPE, message.data).stamp
+            assert is_late or stamp not in waited
+            recorded.add(stamp)
         elif message.type_name == FEEDFORWARD_TYPE and is_late:
             assert decode(FEEDFORWARD_TYPE, message.data).force == 0.0
-    assert answered_late  # not all: a busy machine loses some, since drivers send best effort
+    assert recorded & waited  # not all on a busy machine: drivers send best effort
     result = replay(tmp_path / 'bag')
     assert result.identical, result.first_difference
 

@@ -250,6 +250,7 @@ def _solved(problem: _Problem, weight: FloatArray, start: FloatArray) -> tuple[F
     known = layout.asymmetry + 1
 
     def both(vector: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Weighted rest and Jacobian at a vector, the rows of the prior last."""
         means = [_power_sum(at, c, float(m)) for c, m in zip(problem.columns, vector[layout.exponents], strict=True)]
         pairs = [(float(total.mean()), float(slope.mean())) for total, slope in means]
         friction, slopes = _magnitude(vector, at, problem.columns, pairs, (problem.size, problem.speed))

@@ -138,10 +138,12 @@ class _Handler(RequestHandler):
     """Answers one request, after `prepare` has let it in."""
 
     def initialize(self, server: MonitorServer) -> None:
+        """Take the server, as tornado hands it to each request."""
         self.server = server
         self.set_header('Content-Security-Policy', server.policy)
 
     def set_default_headers(self) -> None:
+        """What every answer has: nothing is kept, framed, guessed or told to other pages."""
         self.set_header('Server', 'seal_friction')
         self.set_header('Cache-Control', 'no-store')
         self.set_header('X-Content-Type-Options', 'nosniff')
