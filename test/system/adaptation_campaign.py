@@ -69,7 +69,7 @@ def scales(day: Day, seconds: float, seed: int) -> tuple[np.ndarray, list[int]]:
         health = followed(health, before, state)
         if health.change.changes > known:
             found.append(health.learnt)
-        shown.append(learnt(PARAMETERS.adaptation, state.adaptation).scale)
+        shown.append(learnt(state.adaptation).scale)
     return np.array(shown[round(BEGIN / day.period) :]), found
 
 

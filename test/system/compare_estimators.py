@@ -1,21 +1,27 @@
 """The estimator beside simpler ones, on logs of a ram: what was known before, and what was seen then.
 
-``python test/system/compare_estimators.py FOLDER`` with logs of the mbari rig in FOLDER. Each estimator is given what
-one log shows (seal file, least squares) and runs over another, causal. Where |v| > 10 mm/s and |a| < 0.05 m/s2, in N:
+``python test/system/compare_estimators.py FOLDER [--figure nis.png]`` with logs of the mbari rig in FOLDER. Each
+estimator is given what one log shows (seal file, least squares) and runs over another, causal. Where |v| > 10 mm/s and
+|a| < 0.05 m/s2, in N:
 
 - ``1 step``, ``0.5 s``, ``2 s``: RMS of the force sum less what was known that long before;
 - ``reversal``: the same in the first 0.3 s of a stroke, known at the end of the stroke before;
 - ``friction``: RMS of the force sum less the friction known one sample before, and less one offset for the whole log.
+
+The figure shows the share of innovations whose normalised square (NIS) is above a value, beside chi-square.
 """
 
 import itertools
 import sys
 import tempfile
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
+from scipy.stats import chi2
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from harness.campaign import parser_of, tell_tables
@@ -137,14 +143,14 @@ def plain_kalman(learnt_on: Log, log: Log) -> Known:
     return Known(terms, np.array(known))
 
 
-def package(seal: Path, log: Log) -> dict[str, float]:
-    """Errors of the package, by the state of its filter; shares of good samples, and of those in their band.
+def package(seal: Path, log: Log) -> tuple[dict[str, float], list[float]]:
+    """Errors of the package, by the state of its filter, shares of good samples and of those in their band; NIS.
 
     The force sum is that of the seal file, which corrects the areas.
     """
     given = chosen_configuration(None, seal).parameters().estimator
     parameters = replace(given, adaptation=AdaptationSettings('on'))
-    state, terms, values, seen, corrected = init(parameters), [], [], [], []
+    state, terms, values, seen, corrected, squares = init(parameters), [], [], [], [], []
     for time, velocity, a, b, force in zip(*(signal.tolist() for signal in log), strict=True):
         stamp = round(time * 1e9)
         sample = RodSample(stamp, velocity, Pressure(stamp, a, b), Force(stamp, force))
@@ -153,13 +159,16 @@ def package(seal: Path, log: Log) -> dict[str, float]:
         law, sign = friction.coulomb_friction + friction.velocity_friction, float(np.sign(velocity))
         terms.append((sign * law, sign, velocity, law, 1.0))
         corrected.append(corrected_force_sum(parameters.force_sum_correction, force, a, b))
-        found = state.adaptation.filter.terms
-        values.append((*found[:4], found.offset + found.remainder))
+        known = state.adaptation.filter
+        if known.stamp == state.adaptation.stamp:
+            squares.append((known.outliers.last / known.innovation_std) ** 2)
+        values.append((*known.terms[:4], known.terms.offset + known.terms.remainder))
         seen.append((estimate.status, estimate.residual, estimate.coulomb_friction_std))
     status, residual, std = np.array(seen)[log.is_even].T
     good = status == 0
     quality = {'good': float(good.mean()), 'in_band': float(np.mean(np.abs(residual[good]) < BAND_95 * std[good]))}
-    return errors(log._replace(force=np.array(corrected)), Known(np.array(terms), np.array(values))) | quality
+    found = errors(log._replace(force=np.array(corrected)), Known(np.array(terms), np.array(values)))
+    return found | quality, squares
 
 
 def errors(log: Log, known: Known) -> dict[str, float]:
@@ -190,7 +199,19 @@ def errors(log: Log, known: Known) -> dict[str, float]:
     return found
 
 
-def compared(folder: Path, work: Path) -> dict[str, dict[str, dict[str, float]]]:
+def draw(path: Path, squares: Mapping[str, list[float]]) -> None:
+    """Share of innovations whose NIS is above a value, for each pair of logs."""
+    figure = Figure(figsize=(6.4, 3.6), layout='constrained')
+    axes, levels = figure.subplots(), np.linspace(0.0, 16.0, 400)
+    axes.semilogy(levels, chi2.sf(levels, 1), 'k--', label='chi-square, one degree of freedom')
+    for name, values in squares.items():
+        axes.semilogy(levels, [float(np.mean(np.array(values) > level)) for level in levels], label=name)
+    axes.set(xlabel='NIS: squared innovation over its variance [-]', ylabel='share above [-]', ylim=(1e-4, 1.0))
+    axes.legend(fontsize='small')
+    figure.savefig(path, dpi=150, metadata={'Software': None})
+
+
+def compared(folder: Path, work: Path, figure: Path | None = None) -> dict[str, dict[str, dict[str, float]]]:
     """Errors of every estimator for every ordered pair of logs."""
     logs = {}
     for path in sorted(folder.glob('*.exp')):
@@ -199,13 +220,17 @@ def compared(folder: Path, work: Path) -> dict[str, dict[str, dict[str, float]]]
         _run('identify', path, '--rig', 'mbari', '--out', seal)
         logs[path.stem] = read_log(bag), seal
     table: dict[str, dict[str, dict[str, float]]] = {}
+    squares: dict[str, list[float]] = {}
     for (one, (learnt_on, seal)), (other, (log, _)) in itertools.permutations(logs.items(), 2):
+        ours, squares[f'{one} -> {other}'] = package(seal, log)
         table[f'{one} -> {other}'] = {
             'least squares, offset of 0.5 s': errors(log, fixed(learnt_on, log)),
             'recursive least squares': errors(log, tuned_recursive(learnt_on, log)),
             'plain Kalman filter': errors(log, plain_kalman(learnt_on, log)),
-            'this package': package(seal, log),
+            'this package': ours,
         }
+    if figure:
+        draw(figure, squares)
     return table
 
 
@@ -218,9 +243,10 @@ def main() -> int:
     """Run and print; exit code 1 if recursive least squares is better anywhere."""
     parser = parser_of(__doc__)
     parser.add_argument('folder', type=Path)
+    parser.add_argument('--figure', type=Path, help='PNG of the normalised innovations squared')
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as work:
-        table = compared(arguments.folder, Path(work))
+        table = compared(arguments.folder, Path(work), arguments.figure)
     tell_tables(table, as_json=arguments.json)
     return int(any(r['this package'][c] > r['recursive least squares'][c] for r in table.values() for c in COLUMNS))
 

@@ -27,12 +27,12 @@ from seal_friction_ros.core.estimation.friction_filter import (
     friction_magnitude,
     updated,
 )
-from seal_friction_ros.core.foundation.compiled import compilable
+from seal_friction_ros.core.foundation.compiled import compilable, replace
 from seal_friction_ros.core.foundation.limits import between
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.parameters import check, parameter
 from seal_friction_ros.core.friction.actuator import ActuatorFriction
-from seal_friction_ros.core.messages.records import NEVER
+from seal_friction_ros.core.messages.records import BITS, NEVER
 
 MODES = ('off', 'observe', 'on')
 
@@ -43,7 +43,7 @@ SETTLED = 0.99  # [-] of the friction, which its lagging value must have reached
 JUMPED = 1.1  # [-] of it that the lagging value must not exceed after a pressure that the law does not know
 LARGEST_INERTIA = 0.5  # [-] of the friction, in a reading with a known mass: the mass may be wrong
 LONGEST_STEP = 0.1  # [s] after a longer gap the acceleration starts anew
-LEARNING_INTERVAL = 8_000_000  # [ns] least time between two samples that are learnt from: what it costs at 1 kHz
+LEARNING_INTERVAL = 9_000_000  # [ns] least time between two samples that are learnt from: all of a log at 100 Hz
 LEAST_STD = 0.01  # [-] of the friction, below which no standard deviation is believed
 IMPLAUSIBLE = 5.0  # [-] innovation over its standard deviation that is a fault of its own
 WRONG_DIRECTION = 1.5  # [-] of the friction that a sample misses whose direction is wrong: it misses twice the friction
@@ -136,6 +136,27 @@ class Rest(NamedTuple):
     leapt: float = 0.0  # [N^2] square of the largest sudden change of the force sum in this rest
 
 
+ANY = 1e300  # [N] innovation that nothing is beyond, before the first reading
+
+
+class Outlook(NamedTuple):
+    """What the filter says of the samples until the next one is learnt from, as far as they do not change it."""
+
+    is_proven: bool  # whether the motion has told the friction
+    status: int  # bit of a step that no reversal has explained, or of a drift that nothing explains
+    most: float  # [N] innovation of a single sample that is explained; negative: none, after innovations that last
+    taken_off: float  # [N] of the force sum of a sliding rod: inertia, offset and remainder
+    offset: float  # [N] of the force sum where the rod is: its gradient goes on since the last reading
+    unsteady_offset: float  # [N] with the remainder
+    scale: float  # [-] friction over that of the law at the last reading, mean of both directions
+    scale_std: float  # [-] negative: nothing is learnt
+
+
+NO_OUTLOOK = Outlook(
+    is_proven=False, status=0, most=ANY, taken_off=0.0, offset=0.0, unsteady_offset=0.0, scale=1.0, scale_std=-1.0
+)
+
+
 class AdaptationState(NamedTuple):
     """What one sample leaves for the next."""
 
@@ -148,6 +169,7 @@ class AdaptationState(NamedTuple):
     filter: FrictionFilter
     strokes: Strokes
     rest: Rest
+    outlook: Outlook
 
 
 NO_SIGNALS = Lagging(0.0, 0.0, 0.0)
@@ -161,6 +183,7 @@ NOT_ADAPTED = AdaptationState(
     filter=NOT_BEGUN,
     strokes=Strokes(),
     rest=Rest(),
+    outlook=NO_OUTLOOK,
 )
 """State before the first sample."""
 
@@ -201,7 +224,7 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     newest = Lagging(velocity, slide.force_sum, friction * direction)
     elapsed = (slide.stamp - state.stamp) * 1e-9 if state.stamp != NEVER else 0.0
     if not 0.0 < elapsed <= LONGEST_STEP:
-        return _interrupted(state, slide.stamp, newest)
+        return _interrupted(settings, state, slide.stamp, newest)
     share = elapsed / (elapsed + LAG)
     once = _lagging(state.once, newest, share)
     twice = _lagging(state.twice, once, share)
@@ -212,7 +235,7 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     way = state.way + 0.5 * elapsed * (state.twice.velocity + twice.velocity)
     if slide.is_usable and direction != 0 and _is_even(settings, acceleration, at_first, friction):
         if slide.is_identified and known.stamp != NEVER:
-            missed = _missed(settings, state, newest, abs(velocity)) / known.innovation_std
+            missed = _missed(state, newest) / known.innovation_std
             bias += elapsed / (elapsed + SHORT_TIME) * (between(-IMPLAUSIBLE, missed, IMPLAUSIBLE) - bias)
         most = JUMPED if slide.is_identified and not strokes.present.is_identified else math.inf
         if most * friction >= twice.friction * direction >= SETTLED * friction >= LEAST_FRICTION:
@@ -221,16 +244,17 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
             strokes = _with_reading(strokes, reading, slide.is_identified)
             if slide.is_identified:
                 known, way = updated(known, reading), 0.0
-    return AdaptationState(slide.stamp, once, twice, acceleration, way, bias, known, strokes, rest)
+    outlook = outlook_of(settings, known, way, bias, acceleration)
+    return AdaptationState(slide.stamp, once, twice, acceleration, way, bias, known, strokes, rest, outlook)
 
 
 @compilable
-def _interrupted(state: AdaptationState, stamp: int, newest: Lagging) -> AdaptationState:
+def _interrupted(settings: AdaptationSettings, state: AdaptationState, stamp: int, newest: Lagging) -> AdaptationState:
     """State after a gap: signals and strokes begin anew."""
+    known, way, rest = state.filter, state.way, Rest(stamp, 0.0, 0.0, 0.0)
     strokes = Strokes(NO_STROKE, NO_STROKE, state.strokes.ratio, state.strokes.reversals)
-    return AdaptationState(
-        stamp, newest, newest, 0.0, state.way, 0.0, state.filter, strokes, Rest(stamp, 0.0, 0.0, 0.0)
-    )
+    outlook = outlook_of(settings, known, way, 0.0, 0.0)
+    return AdaptationState(stamp, newest, newest, 0.0, way, 0.0, known, strokes, rest, outlook)
 
 
 @compilable
@@ -311,89 +335,137 @@ def _is_even(settings: AdaptationSettings, acceleration: float, newest: float, f
 
 
 @compilable
-def left_over(settings: AdaptationSettings, state: AdaptationState, force_sum: float) -> float:
-    """Force sum less inertia, offset and remainder [N]: friction, as far as the filter knows.
+def outlook_of(
+    settings: AdaptationSettings, known: FrictionFilter, way: float, bias: float, acceleration: float
+) -> Outlook:
+    """What the filter says of the next samples.
+
+    An unknown mass explains less of a stroke that is not even: then only a sample that may have the wrong direction
+    contradicts.
 
     Args:
-        settings: With the moving mass.
-        state: Before the sample is learnt from, its acceleration that of the last sample taken.
-        force_sum: [N]
+        settings: With mass and bounds.
+        known: The filter.
+        way: Of the rod since the last reading [m].
+        bias: Mean of the normalised innovations [-].
+        acceleration: [m/s^2]
     """
-    return force_sum - settings.moving_mass * state.acceleration - offset_here(state) - state.filter.terms.remainder
+    inertia = settings.moving_mass * acceleration
+    if known.stamp == NEVER:
+        return replace(NO_OUTLOOK, taken_off=inertia)
+    friction, unexplained, terms = known.friction, known.unexplained, known.terms
+    proven, wavers = known.friction_std <= PROVEN * friction, WAVERING * friction
+    most, lasting = IMPLAUSIBLE * known.innovation_std, LASTING_DRIFT if proven else UNPROVEN_DRIFT
+    if settings.moving_mass == 0.0 and abs(acceleration) > settings.acceleration_max:
+        wrong_direction = WRONG_DIRECTION * friction
+        most = most if most > wrong_direction else wrong_direction
+    if abs(bias) > LASTING or abs(unexplained.drift) > lasting * friction:
+        most = -1.0
+    is_unexplained = known.outliers.is_stepped or unexplained.drift_square > wavers * wavers
+    offset = terms.offset + way * terms.gradient
+    return Outlook(
+        proven,
+        BITS.MODEL_DISAGREES if is_unexplained else 0,
+        most,
+        inertia + offset + terms.remainder,
+        offset,
+        offset + terms.remainder,
+        bounded_friction(settings, known, 0.0, known.speed, friction) / friction,
+        known.friction_std / friction,
+    )
 
 
 @compilable
-def offset_here(state: AdaptationState) -> float:
-    """Offset of the force sum where the rod is [N]: its gradient goes on since the last reading."""
-    return state.filter.terms.offset + state.way * state.filter.terms.gradient
-
-
-@compilable
-def _missed(settings: AdaptationSettings, state: AdaptationState, newest: Lagging, speed: float) -> float:
+def _missed(state: AdaptationState, newest: Lagging) -> float:
     """What a sample of a sliding rod shows more than was expected [N]."""
     direction = 1.0 if newest.velocity > 0.0 else -1.0
-    found = friction_magnitude(state.filter.terms, direction, speed, newest.friction * direction)
-    return left_over(settings, state, newest.force_sum) - direction * found
-
-
-class Moment(NamedTuple):
-    """One sample, and what the filter says of its friction."""
-
-    stamp: int  # [ns]
-    direction: float  # -1.0 or 1.0; 0.0 at rest
-    speed: float  # [m/s] 0.0 at rest
-    force_sum: float  # [N]
-    law: float  # [N] friction of the seal files at this speed
-    found: float  # [N] friction by the filter, without bounds
+    found = friction_magnitude(state.filter.terms, direction, abs(newest.velocity), newest.friction * direction)
+    return newest.force_sum - state.outlook.taken_off - direction * found
 
 
 @compilable
-def moment_of(
-    state: AdaptationState, friction: ActuatorFriction, stamp: int, velocity: float, force_sum: float
-) -> Moment:
-    """A sample with the friction that the filter finds for it."""
-    direction = (1.0 if velocity > 0.0 else -1.0) if velocity != 0.0 else 0.0
-    law = friction.coulomb_friction + friction.velocity_friction
-    found = friction_magnitude(state.filter.terms, direction, abs(velocity), law)
-    return Moment(stamp, direction, abs(velocity), force_sum, law, found)
+def friction_of_sliding(
+    settings: AdaptationSettings, state: AdaptationState, friction: ActuatorFriction, velocity: float, uses: bool
+) -> tuple[ActuatorFriction, float, bool]:
+    r"""Friction of a rod that slides by what is learnt, what the filter finds, and whether that contradicts the other.
 
-
-@compilable
-def adapted_friction(
-    settings: AdaptationSettings, state: AdaptationState, friction: ActuatorFriction, moment: Moment, uses: bool
-) -> tuple[ActuatorFriction, float]:
-    r"""Friction by what is learnt, with its standard deviation, and the offset to take off the force sum at rest [N].
-
-    With ``uses`` it is the mean and the standard deviation of the posterior, once the motion has told the friction.
+    With ``uses`` it is the mean and the standard deviation of the posterior, once the motion has told the friction;
+    beyond the bounds of the scale it contradicts.
     Without, the friction is that of the file and misses the posterior by m; the band that holds 95 % of a normal
-    distribution about m is :math:`(|m| + 1.64 \sigma) / 1.96` where that is wider. At rest the same is said of the
-    force sum and its offset: the deviation is at most the breakaway force, since friction at rest is no larger.
+    distribution about m is :math:`(|m| + 1.64 \sigma) / 1.96` where that is wider. More than twice both deviations
+    contradict.
+
+    Args:
+        settings: With the bounds.
+        state: What is learnt.
+        friction: By the seal files.
+        velocity: [m/s]
+        uses: Whether the estimate uses what is learnt.
+
+    Returns:
+        Friction of the estimate; friction by the filter with the sign of the velocity, without bounds [N].
     """
-    known, law = state.filter, moment.law
-    sliding = between(settings.scale_min * law, moment.found, settings.scale_max * law)
-    if moment.direction == 0.0:
-        scale = sliding / law if law > 0.0 else 1.0
-        std = _std_at_rest(state, moment, scale * (friction.coulomb_friction + friction.stiction))
-        missed = abs(offset_here(state))
-    else:
-        std = _std_of_sliding(known, moment, friction.coulomb_friction_std)
-        missed = abs(sliding - law)
-    std = std if std > LEAST_STD * law else LEAST_STD * law
-    if not uses or not is_proven(known):
-        wider = (missed + ONE_SIDED_95 * std) / BAND_95
-        coulomb, _, stiction, in_identified_range, added = friction
-        return ActuatorFriction(coulomb, std if std > wider else wider, stiction, in_identified_range, added), 0.0
-    at_no_speed = bounded_friction(settings, known, moment.direction, 0.0, friction.coulomb_friction)
-    stiction = friction.stiction * (sliding / law if law > 0.0 else 1.0)
-    taken_off = offset_here(state) if moment.direction == 0.0 else 0.0
-    adapted = ActuatorFriction(at_no_speed, std, stiction, friction.in_identified_range, sliding - at_no_speed)
-    return adapted, taken_off
+    coulomb, file_std, stiction, in_identified_range, added = friction
+    law, known, terms, is_proven = coulomb + added, state.filter, state.filter.terms, state.outlook.is_proven
+    lowest, highest = settings.scale_min, settings.scale_max
+    direction, speed = (1.0, velocity) if velocity > 0.0 else (-1.0, -velocity)
+    slope = terms.scale + direction * terms.asymmetry
+    found = slope * law + terms.coulomb + terms.viscous * speed
+    found = found if found > 0.0 else 0.0
+    sliding = found if lowest * law <= found <= highest * law else between(lowest * law, found, highest * law)
+    std = _std_of_sliding(known, speed, law, file_std)
+    if uses and is_proven:
+        at_no_speed = between(lowest * coulomb, slope * coulomb + terms.coulomb, highest * coulomb)
+        if law > 0.0:
+            stiction *= sliding / law
+        adapted = ActuatorFriction(at_no_speed, std, stiction, in_identified_range, sliding - at_no_speed)
+        return adapted, direction * found, law > 0.0 and sliding != found
+    missed, doubt = found - law, file_std * file_std + known.friction_std * known.friction_std
+    wider = (abs(sliding - law) + ONE_SIDED_95 * std) / BAND_95
+    adapted = ActuatorFriction(coulomb, std if std > wider else wider, stiction, in_identified_range, added)
+    return adapted, direction * found, is_proven and law > 0.0 and missed * missed > 4.0 * doubt
 
 
 @compilable
-def is_proven(known: FrictionFilter) -> bool:
-    """Whether the motion has told the friction: its deviation is at most `PROVEN` of it."""
-    return known.stamp != NEVER and known.friction_std <= PROVEN * known.friction
+def friction_at_rest(
+    settings: AdaptationSettings,
+    state: AdaptationState,
+    friction: ActuatorFriction,
+    stamp: int,
+    force_sum: float,
+    uses: bool,
+) -> tuple[ActuatorFriction, bool]:
+    """Friction of a rod at rest by what is learnt, and whether that, or this rest, contradicts the estimate.
+
+    The standard deviation is that of the force sum less its offset, at most the breakaway force, since friction at rest
+    is no larger. A rest under the breakaway force contradicts, and as `friction_of_sliding` says; so does an offset of
+    more than half the breakaway force where nothing takes it off.
+
+    Args:
+        settings: With the bounds.
+        state: What is learnt.
+        friction: By the seal files.
+        stamp: [ns] of the sample.
+        force_sum: [N]
+        uses: Whether the estimate uses what is learnt.
+    """
+    coulomb, file_std, stiction, in_identified_range, added = friction
+    law, outlook, known = coulomb + added, state.outlook, state.filter
+    found = friction_magnitude(known.terms, 0.0, 0.0, law)
+    sliding = between(settings.scale_min * law, found, settings.scale_max * law)
+    scale = sliding / law if law > 0.0 else 1.0
+    std = _std_at_rest(state, stamp, force_sum, scale * (coulomb + stiction))
+    std = std if std > LEAST_STD * law else LEAST_STD * law
+    is_pressed, can_contradict = state.rest.pressed > LONGEST_PRESS, outlook.is_proven and law > 0.0
+    if uses and outlook.is_proven:
+        at_no_speed = bounded_friction(settings, known, 0.0, 0.0, coulomb)
+        adapted = ActuatorFriction(at_no_speed, std, stiction * scale, in_identified_range, sliding - at_no_speed)
+        return adapted, is_pressed or (can_contradict and sliding != found)
+    missed, doubt = found - law, file_std * file_std + known.friction_std * known.friction_std
+    wider = (abs(outlook.offset) + ONE_SIDED_95 * std) / BAND_95
+    adapted = ActuatorFriction(coulomb, std if std > wider else wider, stiction, in_identified_range, added)
+    contradicts = abs(outlook.offset) > 0.5 * (coulomb + stiction) or missed * missed > 4.0 * doubt
+    return adapted, is_pressed or (can_contradict and contradicts)
 
 
 @compilable
@@ -406,78 +478,33 @@ def bounded_friction(
 
 
 @compilable
-def _std_of_sliding(known: FrictionFilter, moment: Moment, file_std: float) -> float:
+def _std_of_sliding(known: FrictionFilter, speed: float, law: float, file_std: float) -> float:
     """Standard deviation of the friction of a rod that slides [N].
 
     Slow friction that nobody has seen may be Stribeck's.
     """
-    law = moment.law
     if known.stamp == NEVER:
         return math.sqrt(NEW_RUN * law * NEW_RUN * law + file_std * file_std)
-    stribeck = STRIBECK * law * STRIBECK_SPEED / (STRIBECK_SPEED + moment.speed)
+    stribeck = STRIBECK * law * STRIBECK_SPEED / (STRIBECK_SPEED + speed)
     std = known.friction_std * (law / known.friction if law > known.friction else 1.0)
-    return math.sqrt(std * std + stribeck * stribeck)
+    least = LEAST_STD * law
+    std = math.sqrt(std * std + stribeck * stribeck)
+    return std if std > least else least
 
 
 @compilable
-def _std_at_rest(state: AdaptationState, moment: Moment, most: float) -> float:
-    """Standard deviation of the friction of a rod at rest [N], which is the force sum less its offset.
-
-    It is at most the breakaway force ``most`` [N], since friction at rest is no larger.
-    """
-    known, rest = state.filter, state.rest
-    if known.stamp == NEVER or (moment.stamp - rest.slid) * 1e-9 < REST:
+def _std_at_rest(state: AdaptationState, stamp: int, force_sum: float, most: float) -> float:
+    """Standard deviation of the friction of a rod at rest [N], at most the breakaway force ``most`` [N]."""
+    known, rest, spread, way = state.filter, state.rest, state.filter.covariance, state.way
+    if known.stamp == NEVER or (stamp - rest.slid) * 1e-9 < REST:
         return most
-    change = moment.force_sum - state.twice.force_sum
+    change = force_sum - state.twice.force_sum
     noise = change * change if change * change > rest.ripple else rest.ripple
-    row, way = known.covariance.offset, state.way
-    offset = row.offset + way * (2.0 * row.gradient + way * known.covariance.gradient.gradient)
+    offset = spread.bb + way * (2.0 * spread.bg + way * spread.gg)
     remainder = known.terms.remainder  # at rest nothing tells it from the offset
     variance = offset + remainder * remainder + rest.leapt + AT_ONCE * AT_ONCE * (known.unexplained.square + noise)
     std = math.sqrt(variance) if variance > 0.0 else 0.0
     return std if std < most else most
-
-
-@compilable
-def disagrees(
-    settings: AdaptationSettings, state: AdaptationState, friction: ActuatorFriction, moment: Moment, uses: bool
-) -> bool:
-    """Whether what is learnt, or what this rest shows, contradicts the estimate.
-
-    That is: a step that no reversal has explained, a drift of the force sum that nothing explains, a rest under the
-    breakaway force; with ``uses`` a friction out of its bounds, without one that is further from the law than twice
-    both deviations, or an offset of more than half the breakaway force at rest, where nothing takes it off.
-    """
-    known, is_at_rest = state.filter, moment.direction == 0.0
-    if is_at_rest and state.rest.pressed > LONGEST_PRESS:
-        return True
-    drift = WAVERING * known.friction
-    if known.outliers.is_stepped or known.unexplained.drift_square > drift * drift:
-        return True
-    if not is_proven(known) or moment.law <= 0.0:
-        return False
-    if uses:
-        return not settings.scale_min * moment.law <= moment.found <= settings.scale_max * moment.law
-    if is_at_rest and abs(offset_here(state)) > 0.5 * (friction.coulomb_friction + friction.stiction):
-        return True
-    missed, by_file, known_to = moment.found - moment.law, friction.coulomb_friction_std, known.friction_std
-    return missed * missed > 4.0 * (by_file * by_file + known_to * known_to)
-
-
-@compilable
-def is_consistent(settings: AdaptationSettings, state: AdaptationState, missed: float) -> bool:
-    """Whether a sample of a sliding rod that misses what was expected by ``missed`` [N] is explained by the filter."""
-    known = state.filter
-    if known.stamp == NEVER:
-        return True
-    lasting = LASTING_DRIFT if is_proven(known) else UNPROVEN_DRIFT
-    if abs(state.bias) > LASTING or abs(known.unexplained.drift) > lasting * known.friction:
-        return False
-    most = IMPLAUSIBLE * known.innovation_std
-    if settings.moving_mass == 0.0 and abs(state.acceleration) > settings.acceleration_max:
-        wrong_direction = WRONG_DIRECTION * known.friction  # an unknown mass explains less
-        most = most if most > wrong_direction else wrong_direction
-    return abs(missed) <= most
 
 
 class Learnt(NamedTuple):
@@ -491,20 +518,11 @@ class Learnt(NamedTuple):
     reversals: int
 
 
-def learnt(settings: AdaptationSettings, state: AdaptationState) -> Learnt:
+def learnt(state: AdaptationState) -> Learnt:
     """What is learnt so far."""
     known = state.filter
     if known.stamp == NEVER:
         return Learnt(1.0, -1.0, 0.0, -1.0, 0.0, state.strokes.reversals)
-    noise = math.sqrt(known.unexplained.square)
-    scale = learnt_scale(settings, known)
-    std = known.friction_std / known.friction if is_proven(known) else -1.0
-    return Learnt(scale, std, known.terms.offset, noise, known.friction, state.strokes.reversals)
-
-
-@compilable
-def learnt_scale(settings: AdaptationSettings, known: FrictionFilter) -> float:
-    """Friction over that of the law at the last reading, mean of both directions [-]."""
-    if known.stamp == NEVER:
-        return 1.0
-    return bounded_friction(settings, known, 0.0, known.speed, known.friction) / known.friction
+    noise, outlook = math.sqrt(known.unexplained.square), state.outlook
+    std = outlook.scale_std if outlook.is_proven else -1.0
+    return Learnt(outlook.scale, std, known.terms.offset, noise, known.friction, state.strokes.reversals)

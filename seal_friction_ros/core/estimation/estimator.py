@@ -19,14 +19,9 @@ from seal_friction_ros.core.estimation.adaptation import (
     AdaptationState,
     Slide,
     adapt,
-    adapted_friction,
-    disagrees,
-    is_consistent,
+    friction_at_rest,
+    friction_of_sliding,
     is_due,
-    learnt_scale,
-    left_over,
-    moment_of,
-    offset_here,
 )
 from seal_friction_ros.core.estimation.conditioned_velocity import (
     NOT_CONDITIONED,
@@ -475,23 +470,28 @@ def _estimate_with_learnt(
     parameters: Any, known: AdaptationState, seen: Observation, friction: ActuatorFriction
 ) -> tuple[ActuatorFriction, FrictionEstimate]:
     """Friction and estimate by what was learnt before this sample."""
-    settings, uses, learnt, status = parameters.adaptation, parameters.uses_scale, known.filter, seen.status
-    moment = moment_of(known, friction, seen.stamp, seen.velocity, seen.force_sum)
-    adapted, taken_off = adapted_friction(settings, known, friction, moment, uses)
-    if disagrees(settings, known, friction, moment, uses):
+    settings, uses, outlook, velocity = parameters.adaptation, parameters.uses_scale, known.outlook, seen.velocity
+    status, force_sum, left = seen.status | outlook.status, seen.force_sum, 0.0
+    law = friction.coulomb_friction + friction.velocity_friction
+    if velocity == 0.0:
+        adapted, contradicts = friction_at_rest(settings, known, friction, seen.stamp, force_sum, uses)
+        if uses and outlook.is_proven:
+            force_sum -= outlook.offset
+    else:
+        adapted, found, contradicts = friction_of_sliding(settings, known, friction, velocity, uses)
+        if not status & _NO_READING:
+            left = force_sum - outlook.taken_off
+            contradicts = contradicts or abs(left - found) > outlook.most
+            sliding = adapted.coulomb_friction + adapted.velocity_friction
+            left -= sliding if velocity > 0.0 else -sliding
+    if contradicts:
         status |= BITS.MODEL_DISAGREES
-    left = 0.0
-    if seen.velocity != 0.0 and not status & _NO_READING:
-        left = left_over(settings, known, seen.force_sum)
-        if not is_consistent(settings, known, left - moment.direction * moment.found):
-            status |= BITS.MODEL_DISAGREES
-        left -= moment.direction * (adapted.coulomb_friction + adapted.velocity_friction)
-    scale_std = friction.coulomb_friction_std / moment.law if moment.law > 0.0 else 0.0
-    if learnt.stamp != NEVER:
-        scale_std = learnt.friction_std / learnt.friction
-    offset = offset_here(known) + learnt.terms.remainder
-    seen = replace(seen, force_sum=seen.force_sum - taken_off, status=status)
-    return adapted, estimate_of(parameters, seen, adapted, learnt_scale(settings, learnt), scale_std, offset, left)
+    if status != seen.status or force_sum != seen.force_sum:
+        seen = Observation(seen.stamp, velocity, force_sum, status, seen.input_age)
+    scale_std = outlook.scale_std
+    if scale_std < 0.0:
+        scale_std = friction.coulomb_friction_std / law if law > 0.0 else 0.0
+    return adapted, estimate_of(parameters, seen, adapted, outlook.scale, scale_std, outlook.unsteady_offset, left)
 
 
 @compilable

@@ -73,7 +73,7 @@ LONGEST_STEP = 0.1  # [s] of motion that one sample stands for
 
 
 class Terms(NamedTuple):
-    """The state of the filter, its coefficients in a reading, or a row of its covariance."""
+    """The state of the filter, or a row of its covariance."""
 
     scale: float  # s
     coulomb: float  # c
@@ -85,15 +85,36 @@ class Terms(NamedTuple):
 
 
 class Covariance(NamedTuple):
-    """Of the state: one row a term."""
+    """Of the state, which is symmetric: its upper triangle, row by row. Two letters name two terms."""
 
-    scale: Terms
-    coulomb: Terms
-    viscous: Terms
-    asymmetry: Terms
-    offset: Terms
-    gradient: Terms
-    remainder: Terms
+    ss: float
+    sc: float
+    sk: float
+    sa: float
+    sb: float
+    sg: float
+    sn: float
+    cc: float
+    ck: float
+    ca: float
+    cb: float
+    cg: float
+    cn: float
+    kk: float
+    ka: float
+    kb: float
+    kg: float
+    kn: float
+    aa: float
+    ab: float
+    ag: float
+    an: float
+    bb: float
+    bg: float
+    bn: float
+    gg: float
+    gn: float
+    nn: float
 
 
 class Unexplained(NamedTuple):
@@ -134,6 +155,7 @@ class FrictionFilter(NamedTuple):
 
 
 NO_TERMS = Terms(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_COVARIANCE = Covariance(*[0.0] * 28)
 NOT_BEGUN = FrictionFilter(
     stamp=NEVER,
     direction=0,
@@ -144,7 +166,7 @@ NOT_BEGUN = FrictionFilter(
     friction_std=0.0,
     innovation_std=0.0,
     terms=Terms(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    covariance=Covariance(NO_TERMS, NO_TERMS, NO_TERMS, NO_TERMS, NO_TERMS, NO_TERMS, NO_TERMS),
+    covariance=NO_COVARIANCE,
     unexplained=Unexplained(),
     outliers=Outliers(0, 0.0, 0.0, NO_TERMS, False),
 )
@@ -164,12 +186,6 @@ class Reading(NamedTuple):
 
 
 @compilable
-def coefficients(direction: float, velocity: float, friction: float) -> Terms:
-    """How the terms enter a reading."""
-    return Terms(direction * friction, direction, velocity, friction, 1.0, 0.0, 1.0)
-
-
-@compilable
 def friction_magnitude(terms: Terms, direction: float, speed: float, friction: float) -> float:
     """Friction of a rod that slides [N], never negative; at a ``direction`` of 0 the mean of both."""
     magnitude = terms.scale * friction + terms.coulomb + terms.viscous * speed
@@ -178,30 +194,30 @@ def friction_magnitude(terms: Terms, direction: float, speed: float, friction: f
 
 
 @compilable
-def product(row: Terms, by: Terms) -> float:
-    """Scalar product."""
-    a, b, c, d, e, f, g = row
-    p, q, r, s, t, u, v = by
-    total: float = a * p + b * q + c * r + d * s + e * t + f * u + g * v
-    return total
+def expected(terms: Terms, reading: Reading) -> float:
+    """Force sum that these terms let a reading expect [N]."""
+    s, c, k, a, b, _, n = terms
+    direction, law = reading.direction, reading.friction
+    return direction * (s * law + c) + k * reading.velocity + a * law + b + n
 
 
 @compilable
-def _products(covariance: Covariance, by: Terms) -> Terms:
-    """Product of the covariance and a column."""
-    s, c, k, a, b, g, n = covariance
+def _gains(covariance: Covariance, reading: Reading) -> Terms:
+    """Covariance of each term with what a reading has to show [N times the unit of the term]."""
+    c, k, a = float(reading.direction), reading.velocity, reading.friction
+    s = c * a
+    (
+        ss, sc, sk, sa, sb, sg, sn, cc, ck, ca, cb, cg, cn, kk, ka, kb, kg, kn,
+        aa, ab, ag, an, bb, bg, bn, _, gn, nn,
+    ) = covariance  # fmt: skip
     return Terms(
-        product(s, by), product(c, by), product(k, by), product(a, by), product(b, by), product(g, by), product(n, by)
-    )
-
-
-@compilable
-def _less(row: Terms, share: float, by: Terms) -> Terms:
-    """Row less a share of another."""
-    a, b, c, d, e, f, g = row
-    p, q, r, s, t, u, v = by
-    return Terms(
-        a - share * p, b - share * q, c - share * r, d - share * s, e - share * t, f - share * u, g - share * v
+        s * ss + c * sc + k * sk + a * sa + sb + sn,
+        s * sc + c * cc + k * ck + a * ca + cb + cn,
+        s * sk + c * ck + k * kk + a * ka + kb + kn,
+        s * sa + c * ca + k * ka + a * aa + ab + an,
+        s * sb + c * cb + k * kb + a * ab + bb + bn,
+        s * sg + c * cg + k * kg + a * ag + bg + gn,
+        s * sn + c * cn + k * kn + a * an + bn + nn,
     )
 
 
@@ -211,24 +227,12 @@ def begun(reading: Reading) -> FrictionFilter:
     force = reading.friction
     by_file = reading.friction_std / force
     scale = math.sqrt(SCALE_PRIOR * SCALE_PRIOR + by_file * by_file)  # hypot differs by a bit in compiled code
-    std = Terms(
-        scale,
-        COULOMB_PRIOR * force,
-        VISCOUS_PRIOR * force,
-        ASYMMETRY_PRIOR,
-        OFFSET_PRIOR * force,
-        GRADIENT_PRIOR * force,
-        REMAINDER * force,
-    )
-    diagonal = Covariance(
-        Terms(std.scale * std.scale, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-        Terms(0.0, std.coulomb * std.coulomb, 0.0, 0.0, 0.0, 0.0, 0.0),
-        Terms(0.0, 0.0, std.viscous * std.viscous, 0.0, 0.0, 0.0, 0.0),
-        Terms(0.0, 0.0, 0.0, std.asymmetry * std.asymmetry, 0.0, 0.0, 0.0),
-        Terms(0.0, 0.0, 0.0, 0.0, std.offset * std.offset, 0.0, 0.0),
-        Terms(0.0, 0.0, 0.0, 0.0, 0.0, std.gradient * std.gradient, 0.0),
-        Terms(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, std.remainder * std.remainder),
-    )
+    coulomb, viscous, offset = COULOMB_PRIOR * force, VISCOUS_PRIOR * force, OFFSET_PRIOR * force
+    gradient, remainder = GRADIENT_PRIOR * force, REMAINDER * force
+    diagonal = replace(
+        NO_COVARIANCE, ss=scale * scale, cc=coulomb * coulomb, kk=viscous * viscous,
+        aa=ASYMMETRY_PRIOR * ASYMMETRY_PRIOR, bb=offset * offset, gg=gradient * gradient, nn=remainder * remainder,
+    )  # fmt: skip
     return replace(
         NOT_BEGUN, stamp=reading.stamp, covariance=diagonal, unexplained=Unexplained(LEAST_NOISE, force, 0.0, 0.0, 0.0)
     )
@@ -250,32 +254,19 @@ def _predicted(known: FrictionFilter, reading: Reading, elapsed: float, moved: f
     coulomb, viscous, offset = COULOMB_WALK * law, VISCOUS_WALK * law, OFFSET_WALK * law
     gradient, remainder = GRADIENT_WALK * law / longest, REMAINDER * law
     curved = abs(way) / longest if known.unexplained.drift_square > drift * drift else 0.0
-    s, c, k, a, b, g, n = known.covariance  # one unpacking takes a quarter of the time of an attribute each
+    (
+        ss, sc, sk, sa, sb, sg, sn, cc, ck, ca, cb, cg, cn, kk, ka, kb, kg, kn,
+        aa, ab, ag, an, bb, bg, bn, gg, gn, nn,
+    ) = known.covariance  # fmt: skip
     return Covariance(
-        Terms(s[0] + moved * SCALE_WALK * SCALE_WALK, s[1], s[2], s[3], s[4] + way * s[5], s[5], kept * s[6]),
-        Terms(c[0], c[1] + moved * coulomb * coulomb, c[2], c[3], c[4] + way * c[5], c[5], kept * c[6]),
-        Terms(k[0], k[1], k[2] + moved * viscous * viscous, k[3], k[4] + way * k[5], k[5], kept * k[6]),
-        Terms(a[0], a[1], a[2], a[3] + moved * ASYMMETRY_WALK * ASYMMETRY_WALK, a[4] + way * a[5], a[5], kept * a[6]),
-        Terms(
-            b[0] + way * g[0],
-            b[1] + way * g[1],
-            b[2] + way * g[2],
-            b[3] + way * g[3],
-            b[4] + way * (b[5] + g[4] + way * g[5]) + elapsed * offset * offset,
-            b[5] + way * g[5],
-            kept * (b[6] + way * g[6]),
-        ),
-        Terms(g[0], g[1], g[2], g[3], g[4] + way * g[5], g[5] + curved * gradient * gradient, kept * g[6]),
-        Terms(
-            kept * n[0],
-            kept * n[1],
-            kept * n[2],
-            kept * n[3],
-            kept * (n[4] + way * n[5]),
-            kept * n[5],
-            kept * kept * n[6] + (1.0 - kept * kept) * remainder * remainder,
-        ),
-    )
+        ss + moved * SCALE_WALK * SCALE_WALK, sc, sk, sa, sb + way * sg, sg, kept * sn,
+        cc + moved * coulomb * coulomb, ck, ca, cb + way * cg, cg, kept * cn,
+        kk + moved * viscous * viscous, ka, kb + way * kg, kg, kept * kn,
+        aa + moved * ASYMMETRY_WALK * ASYMMETRY_WALK, ab + way * ag, ag, kept * an,
+        bb + way * (2.0 * bg + way * gg) + elapsed * offset * offset, bg + way * gg, kept * (bn + way * gn),
+        gg + curved * gradient * gradient, kept * gn,
+        kept * kept * nn + (1.0 - kept * kept) * remainder * remainder,
+    )  # fmt: skip
 
 
 @compilable
@@ -285,7 +276,6 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
         known = begun(reading)
     elapsed = between(0.0, (reading.stamp - known.stamp) * 1e-9, 3600.0)
     moved = elapsed if elapsed < LONGEST_STEP else LONGEST_STEP
-    column = coefficients(reading.direction, reading.velocity, reading.friction)
     kept = REMAINDER_TIME / (REMAINDER_TIME + elapsed)
     stroke, longest = abs(reading.way), known.longest
     if reading.direction == known.direction:
@@ -295,11 +285,12 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
     s, c, k, a, b, g, n = known.terms
     terms = Terms(s, c, k, a, b + reading.way * g, g, kept * n)
     covariance = _predicted(known, reading, elapsed, moved, stroke if stroke > longest else longest)
-    innovation = reading.force - product(terms, column)
+    innovation = reading.force - expected(terms, reading)
     usual = known.unexplained.usual
     noise = known.unexplained.noise * (reading.friction if reading.friction > usual else usual)
-    gains = _products(covariance, column)
-    variance = product(gains, column) + noise * noise
+    gains = _gains(covariance, reading)
+    spread = expected(gains, reading)
+    variance = spread + noise * noise
 
     outliers, steps = _outliers(known, reading.direction, terms, innovation, variance)
     unexplained = _followed(
@@ -307,10 +298,11 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
     )
     if steps:
         terms = outliers.settled
-        innovation = reading.force - product(terms, column)
+        innovation = reading.force - expected(terms, reading)
         covariance = _freed(covariance, innovation, reading.direction * reading.friction)
-        gains = _products(covariance, column)
-    terms, covariance = _corrected(terms, covariance, gains, product(gains, column), innovation, noise)
+        gains = _gains(covariance, reading)
+        spread = expected(gains, reading)
+    terms, covariance = _corrected(terms, covariance, gains, spread, innovation, noise)
 
     untold = terms.gradient * (stroke - longest) if stroke > longest else 0.0
     std = friction_std(covariance, unexplained.drift_square + untold * untold, reading)
@@ -351,15 +343,28 @@ def _corrected(
     distance = abs(innovation) / math.sqrt(variance)
     if distance > OUTLIER:
         variance = spread + noise * noise * (distance / OUTLIER) * (distance / OUTLIER)
-    return _less(terms, -innovation / variance, gains), Covariance(
-        _less(covariance.scale, gains.scale / variance, gains),
-        _less(covariance.coulomb, gains.coulomb / variance, gains),
-        _less(covariance.viscous, gains.viscous / variance, gains),
-        _less(covariance.asymmetry, gains.asymmetry / variance, gains),
-        _less(covariance.offset, gains.offset / variance, gains),
-        _less(covariance.gradient, gains.gradient / variance, gains),
-        _less(covariance.remainder, gains.remainder / variance, gains),
-    )
+    s, c, k, a, b, g, n = gains
+    sv, cv, kv, av, bv, gv, nv = (
+        s / variance, c / variance, k / variance, a / variance, b / variance, g / variance, n / variance,
+    )  # fmt: skip
+    (
+        ss, sc, sk, sa, sb, sg, sn, cc, ck, ca, cb, cg, cn, kk, ka, kb, kg, kn,
+        aa, ab, ag, an, bb, bg, bn, gg, gn, nn,
+    ) = covariance  # fmt: skip
+    scale, coulomb, viscous, asymmetry, offset, gradient, remainder = terms
+    terms = Terms(
+        scale + sv * innovation, coulomb + cv * innovation, viscous + kv * innovation, asymmetry + av * innovation,
+        offset + bv * innovation, gradient + gv * innovation, remainder + nv * innovation,
+    )  # fmt: skip
+    return terms, Covariance(
+        ss - sv * s, sc - sv * c, sk - sv * k, sa - sv * a, sb - sv * b, sg - sv * g, sn - sv * n,
+        cc - cv * c, ck - cv * k, ca - cv * a, cb - cv * b, cg - cv * g, cn - cv * n,
+        kk - kv * k, ka - kv * a, kb - kv * b, kg - kv * g, kn - kv * n,
+        aa - av * a, ab - av * b, ag - av * g, an - av * n,
+        bb - bv * b, bg - bv * g, bn - bv * n,
+        gg - gv * g, gn - gv * n,
+        nn - nv * n,
+    )  # fmt: skip
 
 
 @compilable
@@ -415,14 +420,9 @@ def _freed(covariance: Covariance, innovation: float, force: float) -> Covarianc
         force: Friction of the law with the sign of the direction [N].
     """
     scale_variance = (STEP_OF_FRICTION * innovation / force) * (STEP_OF_FRICTION * innovation / force)
-    s, b = covariance.scale, covariance.offset
     shared = -force * scale_variance
     freed = innovation * innovation + force * force * scale_variance
-    return replace(
-        covariance,
-        scale=replace(s, scale=s.scale + scale_variance, offset=s.offset + shared),
-        offset=replace(b, scale=b.scale + shared, offset=b.offset + freed),
-    )
+    return replace(covariance, ss=covariance.ss + scale_variance, sb=covariance.sb + shared, bb=covariance.bb + freed)
 
 
 @compilable
@@ -434,8 +434,9 @@ def friction_std(covariance: Covariance, drift_square: float, reading: Reading) 
         drift_square: Mean square of what drifts and may be friction [N^2].
         reading: That the friction is asked for.
     """
-    law = reading.friction
-    column = Terms(reading.direction * law, reading.direction, reading.velocity, law, 0.0, 0.0, 0.0)
-    least = REMAINDER * law * REMAINDER * law
-    variance = product(_products(covariance, column), column) + (drift_square if drift_square > least else least)
+    c, k, a = float(reading.direction), reading.velocity, reading.friction
+    s, p, least = c * a, covariance, REMAINDER * a * REMAINDER * a
+    variance = s * s * p.ss + c * c * p.cc + k * k * p.kk + a * a * p.aa
+    variance += 2.0 * (s * (c * p.sc + k * p.sk + a * p.sa) + c * (k * p.ck + a * p.ca) + k * a * p.ka)
+    variance += drift_square if drift_square > least else least
     return math.sqrt(variance) if variance > 0.0 else 0.0

@@ -29,7 +29,7 @@ from operator import attrgetter
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation import estimator
-from seal_friction_ros.core.estimation.adaptation import bounded_friction, is_proven
+from seal_friction_ros.core.estimation.adaptation import bounded_friction
 from seal_friction_ros.core.estimation.conditioned_velocity import (
     NOT_CONDITIONED,
     SETTLING,
@@ -402,7 +402,7 @@ def _feed_forward(parameters: Any, state: Any, stamp: int, received: int, frame_
 @compilable
 def _friction_at(parameters: Any, known: Any, temperature: SealTemperature, coulomb: float, velocity: float) -> float:
     """Friction at a wanted velocity [N], >= 0, from the Coulomb friction of the newest estimate [N]."""
-    learns = parameters.uses_scale and is_proven(known.adaptation.filter)
+    learns = parameters.uses_scale and known.adaptation.outlook.is_proven
     if not (learns or parameters.depends_on_velocity):
         return coulomb
     used = known.pressure

@@ -104,7 +104,7 @@ def health_values(
     Friction that differs in the two directions cannot be told from a constant load: both are the offset. So the offset
     is given over the friction.
     """
-    known, change = learnt(parameters.adaptation, state), health.change
+    known, change = learnt(state), health.change
     age = 'never' if state.filter.stamp == NEVER else f'{(state.stamp - state.filter.stamp) * 1e-9:.1f}'
     friction = known.scale * known.friction
     first = health.first if known.reversals >= REFERENCE_REVERSALS else 0.0

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, learnt
-from seal_friction_ros.core.estimation.estimator import DEFAULT_ADAPTATION
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.replay.bag_health import bag_health
@@ -35,7 +34,7 @@ def write_adapted_seal(bags: Sequence[Path], seal: Path, out: Path, namespace: s
     state = None
     for bag in bags:
         state = bag_health(bag, namespace, override, state).learnt or state
-    found = learnt(DEFAULT_ADAPTATION, state or NOT_ADAPTED)
+    found = learnt(state or NOT_ADAPTED)
     if found.scale_std < 0.0:
         raise ValueError(
             f'{bags[-1]}: too few reversals at even speed to learn a scale: move the rod to and fro at least four '

@@ -15,7 +15,6 @@ from seal_friction_ros.core.estimation.adaptation import AdaptationState
 from seal_friction_ros.core.estimation.adaptation import learnt as learnt_of
 from seal_friction_ros.core.estimation.compiled_pipeline import Answers
 from seal_friction_ros.core.estimation.configuration import Configuration, Snapshot
-from seal_friction_ros.core.estimation.estimator import DEFAULT_ADAPTATION
 from seal_friction_ros.core.estimation.friction_filter import PROVEN
 from seal_friction_ros.core.estimation.seal_health import START, Starts, with_sample
 from seal_friction_ros.core.foundation.arrays import FloatArray
@@ -91,7 +90,7 @@ def bag_health(
         raise BagError(f'{bag}: {error}: `seal_friction replay` tells more') from None
     table = np.concatenate(rows, axis=1) if rows else np.zeros((5, 0))
     table = table[:, np.append(True, np.diff(table[1]) != 0.0)] if table.shape[1] else table  # nothing learnt between
-    noise = learnt_of(DEFAULT_ADAPTATION, end).noise if end is not None and end.filter.stamp != NEVER else float('nan')
+    noise = learnt_of(end).noise if end is not None and end.filter.stamp != NEVER else float('nan')
     time, scale, scale_std, offset, friction = table
     return BagHealth(time, scale, scale_std, offset, friction, noise, np.array(starts), end)
 

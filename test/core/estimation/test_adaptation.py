@@ -6,6 +6,7 @@ from statistics import fmean
 from typing import NamedTuple
 
 import pytest
+from harness.learnt import learnt_state
 from harness.simulated_day import SECOND, START, Day, samples
 from hypothesis import given
 from hypothesis import strategies as st
@@ -25,11 +26,11 @@ from seal_friction_ros.core.estimation.adaptation import (
     Slide,
     Stroke,
     adapt,
-    adapted_friction,
     can_be_compared,
+    friction_at_rest,
+    friction_of_sliding,
     is_due,
     learnt,
-    moment_of,
     ratio_of,
 )
 from seal_friction_ros.core.estimation.disagreement import Reversal, likely_reason, reversal_between
@@ -188,7 +189,7 @@ def strokes(seconds, friction=45.0, offset=0.0, start=START, **changes):
 
 
 def test_even_strokes_teach_and_rest_bad_inputs_and_unknown_inertia_do_not():
-    assert learnt(SETTINGS, adapted(strokes(10.0))).scale == pytest.approx(45.0 / 40.0, rel=0.02)
+    assert learnt(adapted(strokes(10.0))).scale == pytest.approx(45.0 / 40.0, rel=0.02)
     nothing = {
         'rest': moving(10.0, lambda _: 0.0, lambda time: 40.0 * math.sin(time)),
         'bad inputs': strokes(10.0, is_usable=False),
@@ -234,7 +235,7 @@ def test_inertia_of_a_known_mass_is_no_friction():
         )
         for i, (v, a) in enumerate((5.0 * v, 5.0 * a) for v, a in swings)
     ]
-    assert learnt(settings, adapted(slides, settings)).scale == pytest.approx(50.0 / 40.0, rel=0.03)
+    assert learnt(adapted(slides, settings)).scale == pytest.approx(50.0 / 40.0, rel=0.03)
 
 
 @pytest.mark.parametrize(('gap', 'is_known'), [(0.1, True), (0.101, False), (-0.01, False), (0.0, False)])
@@ -349,20 +350,16 @@ def test_what_is_not_friction_moves_the_friction_by_less_than_5_percent_or_is_sa
 @pytest.mark.parametrize('velocity_friction', [-6.0, 0.0, 6.0])
 def test_before_the_data_have_spoken_the_friction_is_that_of_the_file(velocity_friction, velocity, mode):
     law = LAW_AT_40._replace(velocity_friction=velocity_friction)
-    friction, _ = adapted_friction(
-        SETTINGS, NOT_ADAPTED, law, moment_of(NOT_ADAPTED, law, START, velocity, 0.0), mode == 'on'
-    )
+    friction, _, _ = friction_of_sliding(SETTINGS, NOT_ADAPTED, law, velocity, mode == 'on')
     assert friction._replace(coulomb_friction_std=4.0) == law
 
 
 @pytest.mark.parametrize('mode', ['observe', 'on'])
 @pytest.mark.parametrize('velocity', [0.02, -0.02])
 def test_before_the_data_have_spoken_the_band_is_that_of_a_new_run(mode, velocity):
-    friction, offset = adapted_friction(
-        SETTINGS, NOT_ADAPTED, LAW_AT_40, moment_of(NOT_ADAPTED, LAW_AT_40, START, velocity, 0.0), mode == 'on'
-    )
+    friction, _, contradicts = friction_of_sliding(SETTINGS, NOT_ADAPTED, LAW_AT_40, velocity, mode == 'on')
     assert friction.coulomb_friction_std == pytest.approx(math.hypot(NEW_RUN * 40.0, 4.0), rel=0.2)
-    assert offset == 0.0
+    assert not contradicts
 
 
 @pytest.mark.parametrize('mode', ['observe', 'on'])
@@ -388,19 +385,14 @@ def test_the_friction_of_each_direction_lies_in_the_band_where_it_differs_by_dir
 
 def test_nobody_knows_a_friction_to_less_than_1_percent():
     state = adapted(strokes(10.0))
-    certain = state._replace(filter=state.filter._replace(friction_std=0.0))
-    friction, _ = adapted_friction(
-        SETTINGS, certain, LAW_AT_40, moment_of(certain, LAW_AT_40, state.stamp, 1.0, 0.0), True
-    )
+    certain = learnt_state(state, SETTINGS, filter=state.filter._replace(friction_std=0.0))
+    friction, _, _ = friction_of_sliding(SETTINGS, certain, LAW_AT_40, 1.0, True)
     assert friction.coulomb_friction_std >= LEAST_STD * 40.0
 
 
 def test_observe_has_a_band_about_the_file_that_holds_what_is_learnt():
     state = adapted(strokes(30.0, friction=52.0))
-    used, observed = (
-        adapted_friction(SETTINGS, state, LAW_AT_40, moment_of(state, LAW_AT_40, state.stamp, 0.02, 0.0), uses)[0]
-        for uses in (True, False)
-    )
+    used, observed = (friction_of_sliding(SETTINGS, state, LAW_AT_40, 0.02, uses)[0] for uses in (True, False))
     found = used.coulomb_friction + used.velocity_friction
     assert found == pytest.approx(52.0, rel=0.02)
     assert observed[::2] == LAW_AT_40[::2]
@@ -413,7 +405,10 @@ def test_observe_has_a_band_about_the_file_that_holds_what_is_learnt():
 def test_friction_never_drives(force, velocity, velocity_friction, uses):
     """Whatever was learnt, as of a force sum with the wrong sign; the law itself never drives."""
     law = LAW_AT_40._replace(velocity_friction=velocity_friction)
-    friction, _ = adapted_friction(SETTINGS, WRONG_SIGN, law, moment_of(WRONG_SIGN, law, START, velocity, force), uses)
+    if velocity != 0.0:
+        friction = friction_of_sliding(SETTINGS, WRONG_SIGN, law, velocity, uses)[0]
+    else:
+        friction = friction_at_rest(SETTINGS, WRONG_SIGN, law, START, force, uses)[0]
     assert friction.coulomb_friction >= 0.0
     assert friction.coulomb_friction_std > 0.0
     assert not uses or friction.coulomb_friction + friction.velocity_friction >= 0.0
@@ -461,11 +456,9 @@ def test_at_rest_the_band_holds_an_offset_of_the_force_sum(push, load, mode):
 
 
 def test_at_rest_before_any_motion_the_deviation_is_the_breakaway_force():
-    friction, offset = adapted_friction(
-        SETTINGS, NOT_ADAPTED, LAW_AT_40, moment_of(NOT_ADAPTED, LAW_AT_40, START, 0.0, 30.0), True
-    )
+    friction, contradicts = friction_at_rest(SETTINGS, NOT_ADAPTED, LAW_AT_40, START, 30.0, True)
     assert friction.coulomb_friction_std == pytest.approx(50.0)
-    assert offset == 0.0
+    assert not contradicts
 
 
 def test_a_rod_that_rests_under_more_than_the_breakaway_force_contradicts_the_law():

@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import pytest
+from harness.learnt import learnt_state
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from paths import ROOT
@@ -794,9 +795,9 @@ def test_before_anything_is_learnt_the_deviation_of_the_scale_is_that_of_the_sea
     assert adapted_step(sample(pressure=None))[1].adaptation_scale_std == 0.0  # no friction to compare with
 
 
-def test_a_sample_is_learnt_from_every_8_ms_and_no_more_often():
+def test_a_sample_is_learnt_from_every_9_ms_and_no_more_often():
     before = slid()
-    for milliseconds, learns in ((1, False), (7, False), (8, True)):
+    for milliseconds, learns in ((1, False), (8, False), (9, True)):
         after, _ = adapted_step(sample(before.adaptation.stamp + milliseconds * MS), before=before)
         assert (after.adaptation != before.adaptation) is learns
 
@@ -805,7 +806,7 @@ def test_a_law_that_disagrees_is_learnt_from_on():
     before = slid()
     learnt = before.adaptation.filter
     learnt = learnt._replace(terms=learnt.terms._replace(scale=2.5), friction_std=1.0)
-    before.adaptation = before.adaptation._replace(filter=learnt)
+    before.adaptation = learnt_state(before.adaptation, filter=learnt)
     after, estimate = adapted_step(sample(before.stamp + 10 * MS), before=before)
     assert estimate.status == Status.MODEL_DISAGREES
     assert after.adaptation.filter.stamp == after.stamp

@@ -42,9 +42,8 @@ from seal_friction_ros.core.estimation.friction_filter import (
     FrictionFilter,
     Reading,
     Terms,
-    coefficients,
+    expected,
     friction_magnitude,
-    product,
     updated,
 )
 from seal_friction_ros.core.messages.records import NEVER
@@ -104,7 +103,9 @@ def true_magnitude(machine: Machine, direction: int) -> float:
 
 def matrix(state: FrictionFilter) -> np.ndarray:
     """Covariance."""
-    return np.array(state.covariance)
+    upper = np.zeros((7, 7))
+    upper[np.triu_indices(7)] = state.covariance
+    return upper + np.triu(upper, 1).T
 
 
 def stds(state: FrictionFilter) -> Terms:
@@ -306,7 +307,7 @@ def innovation(before: FrictionFilter, reading: Reading) -> float:
     elapsed = (reading.stamp - before.stamp) * 1e-9
     remainder = before.terms.remainder * REMAINDER_TIME / (REMAINDER_TIME + elapsed)
     terms = before.terms._replace(offset=before.terms.offset + reading.way * before.terms.gradient, remainder=remainder)
-    return reading.force - product(terms, coefficients(reading.direction, reading.velocity, reading.friction))
+    return reading.force - expected(terms, reading)
 
 
 # --- what a motion tells ---

@@ -7,6 +7,7 @@ from itertools import pairwise
 import pytest
 from harness.answers import NOTHING, receive_one
 from harness.compensation import COMPENSATING, compensating
+from harness.learnt import learnt_state
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -500,7 +501,7 @@ def test_the_feed_forward_has_the_scale_that_is_learnt_on_all_of_its_friction(mo
     learnt = begun(Reading(0, 60.0, 1, 0.05, 0.0, 40.0, 3.0))
     learnt = learnt._replace(terms=learnt.terms._replace(scale=1.5), covariance=NOT_BEGUN.covariance)
     learnt = learnt._replace(innovation_std=4.0, friction=40.0, friction_std=4.0)
-    state.estimator.adaptation = state.estimator.adaptation._replace(filter=learnt)
+    state.estimator.adaptation = learnt_state(state.estimator.adaptation, filter=learnt)
     for message in ticks(0, 5):
         state, answer = receive_one(known, state, message)
     both = actuator_friction(viscous.seals, 3e6, 3e6, 0.05)

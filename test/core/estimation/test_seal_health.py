@@ -5,6 +5,7 @@ from dataclasses import replace
 from statistics import fmean, median
 
 import pytest
+from harness.learnt import learnt_state
 from harness.simulated_day import Day, samples
 from paths import ROOT
 
@@ -225,7 +226,7 @@ def test_a_reversal_that_is_not_learnt_from_is_kept_and_neither_counted_nor_watc
 
 
 def values(known=NOT_BEGUN, health=SealHealth(), starts=Starts(), **state):  # noqa: B008  immutable
-    return health_values(PARAMETERS, NOT_ADAPTED._replace(filter=known, **state), health, starts)
+    return health_values(PARAMETERS, learnt_state(NOT_ADAPTED, filter=known, **state), health, starts)
 
 
 def test_what_is_not_known_is_said_to_be_unknown():

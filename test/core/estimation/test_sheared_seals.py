@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from harness.learnt import learnt_state
 from hypothesis import assume, example, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
@@ -892,7 +893,7 @@ def test_the_force_sum_of_a_rod_that_stopped_counts_if_its_inertia_is_at_most_ha
     acceleration = inertia * estimate.coulomb_friction / mass
     known_filter = state.adaptation.filter
     learnt = known_filter._replace(terms=known_filter.terms._replace(offset=3.0, remainder=0.0))
-    state.adaptation = state.adaptation._replace(acceleration=acceleration, filter=learnt)
+    state.adaptation = learnt_state(state.adaptation, known.adaptation, acceleration=acceleration, filter=learnt)
     at = stamp + MS
     _, stopped = step(known, state, RodSample(at, 0.0, Pressure(at, PRESSURE, PRESSURE), Force(at, -5.0)))
     expected = -5.0 - 3.0 - mass * acceleration
