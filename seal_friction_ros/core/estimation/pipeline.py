@@ -149,6 +149,8 @@ class PipelineState:
     def turn_since(self, before: 'PipelineState') -> Turn | None:
         """The end of a stroke between the state before a message and this one, if the adaptation learns from it."""
         last, learnt = before.estimator.adaptation.strokes, self.estimator.adaptation.strokes
+        if learnt is last:
+            return None
         if learnt.present.direction == last.present.direction and learnt.reversals == last.reversals:
             return None
         return Turn(before.estimator, self.estimator)
@@ -189,6 +191,10 @@ def receive(
     """
     since = acting_since(parameters.feedforward, received, received if sent is None else sent)
     _RECEIVERS[type(message)](parameters, state, message, received, since, emit)
+
+
+def no_answer(_record: Output, _frame_id: bytes) -> None:
+    """For a message that makes no answer."""
 
 
 def answered(

@@ -60,6 +60,8 @@ _TEMPERATURE = _PLACE['temperature']
 _OLDER_QUANTITIES = _TEMPERATURE  # how many there were before the temperature
 _REFERENCE = tuple(_PLACE[f'reference_{name}'] for name in ('position', 'velocity', 'acceleration'))
 
+KEPT = (Pressure, Force)  # records that are kept for the next velocity, and no more
+
 Emit = Callable[[str, Output, bytes], object]
 """Takes an answer: name of the actuator, record, frame name."""
 
@@ -287,7 +289,7 @@ def receive(
 
     Args:
         machine: From `make_machine`.
-        state: From `init` or the message before.
+        state: From `init` or the message before; not to be used again.
         plan: Of the topic of the message: one of ``machine.plans``, or `record_plan` of a tick or simulated time.
         message: As ``plan.read`` makes it.
         received: When it was received [ns], on the clock of `pipeline.receive`.
@@ -297,6 +299,11 @@ def receive(
     Returns:
         The next state.
     """
+    if type(message) in KEPT:  # two of three messages: nothing in them can fail half-way
+        for number, _ in plan.taken:
+            parameters, kept = machine.actuators[number].pipeline, state.actuators[number].pipeline
+            pipeline.receive(parameters, kept, message, received, pipeline.no_answer, sent)
+        return state
     states = list(state.actuators)
     for number, taken in plan.taken:
         actuator, known = machine.actuators[number], states[number]
