@@ -49,7 +49,7 @@ from harness.processes import free_domain, graph_environment, node_process
 from seal_friction_ros.core.messages.coder import encode
 from seal_friction_ros.core.messages.records import Force, Pressure, Velocity
 from seal_friction_ros.nodes import qos
-from seal_friction_ros.nodes.discovery import PROFILES
+from seal_friction_ros.nodes.discovery import PROFILES, RANGE
 from seal_friction_ros.nodes.executor import spin
 
 RATES = (100, 500, 1000)  # [Hz]
@@ -269,6 +269,7 @@ def node(case: str, folder: Path, realtime: int, before: Path | None = None) -> 
             process = stack.enter_context(node_process('friction_estimator', domain, values, log, **tree))
         for name in PROFILES:
             os.environ.pop(name, None)
+        os.environ[RANGE] = 'LOCALHOST'
         asker = stack.enter_context(Asker(case, domain, process))
         deadline = time.monotonic() + _PATIENCE
         while not asker.is_answered():
@@ -281,7 +282,7 @@ def measure(
     cases: Collection[str], lengths: Rounds, seconds: float, realtime: int, rates: tuple[int, ...], before: Path | None
 ) -> dict[str, dict[int, Figures]]:
     """Ask all of them in turn, to and fro."""
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    os.environ[RANGE] = 'LOCALHOST'
     found = {case: {rate: Figures() for rate in rates} for case in cases}
     with ExitStack() as stack, Progress(console=Console(stderr=True)) as progress:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))

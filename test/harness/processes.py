@@ -51,7 +51,7 @@ def free_domain() -> int:
 def graph_environment(domain: int) -> dict[str, str]:
     """Environment variables of a process on ``domain``; its messages stay on this machine."""
     set_up_discovery()
-    return {**os.environ, 'ROS_DOMAIN_ID': str(domain), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+    return {**os.environ, 'ROS_DOMAIN_ID': str(domain)}
 
 
 @contextmanager
