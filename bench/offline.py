@@ -62,9 +62,10 @@ def write_log(path: Path, samples: int) -> None:
 
 
 def _import() -> Callable[[Path], object]:
-    from seal_friction_ros.offline.bags.import_log import import_log
+    from seal_friction_ros.offline.bags.import_log import convert_log
+    from seal_friction_ros.offline.bags.rig_file import read_rig
 
-    return lambda folder: import_log(folder / 'log.csv', folder / 'rig.yaml', folder / 'bag')
+    return lambda folder: convert_log(folder / 'log.csv', folder / 'bag', read_rig(folder / 'rig.yaml'))
 
 
 def _replay() -> Callable[[Path], object]:

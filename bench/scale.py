@@ -42,13 +42,14 @@ def files_of(bag: Path) -> list[Path]:
 
 def make_bag(folder: Path, seconds: float) -> Path:
     """A bag without answers, and beside it one with them."""
-    from seal_friction_ros.offline.bags.import_log import import_log
+    from seal_friction_ros.offline.bags.import_log import convert_log
+    from seal_friction_ros.offline.bags.rig_file import read_rig
     from seal_friction_ros.offline.replay.replay import replay
 
     folder.mkdir(parents=True)
     write_log(folder / 'log.csv', round(seconds * RATE))
     (folder / 'rig.yaml').write_text(RIG)
-    import_log(folder / 'log.csv', folder / 'rig.yaml', folder / 'inputs')
+    convert_log(folder / 'log.csv', folder / 'inputs', read_rig(folder / 'rig.yaml'))
     replay(folder / 'inputs', out=folder / 'recorded')
     (folder / 'log.csv').unlink()
     return folder / 'recorded'

@@ -25,6 +25,7 @@ from seal_friction_ros.core.estimation.node_options import (
     ROS_PARAMETERS,
 )
 from seal_friction_ros.core.foundation.documents import DEEPEST
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.foundation.parameters import ParameterGroup, from_mapping, meant, printable, similar_names
 from seal_friction_ros.core.friction.actuator import MountedSeal
 from seal_friction_ros.core.friction.seal_file import mounting_of
@@ -76,13 +77,11 @@ def read_yaml(path: Path, largest: int = _LARGEST_YAML) -> Any:
     Raises:
         ValueError: The file is missing, not readable, too large or not plain YAML; one line that names the file.
     """
-    try:
+    with named_errors(path, OSError):
         if path.exists() and not (path.is_file() or path.is_dir()):  # reading a pipe or a device may never end
             raise ValueError(f'{path}: not a file')
         with path.open('rb') as file:
             data = file.read(largest + 1)
-    except OSError as error:
-        raise ValueError(f'{path}: {error.strerror}') from None
     return parse_yaml(data, str(path), largest)
 
 
@@ -132,10 +131,8 @@ def config_path(kind: str, name: str) -> Path:
         ValueError: The path starts with an unknown user (``~user``), or there is no file of this name.
     """
     if '/' in name or name.endswith('.yaml'):
-        try:
+        with named_errors(name, RuntimeError):
             return Path(name).expanduser()
-        except RuntimeError as error:
-            raise ValueError(f'{name}: {error}') from None
     path = share_directory('seal_friction_ros', __file__) / 'config' / kind / f'{name}.yaml'
     if not path.is_file():
         names = config_names(kind)
@@ -165,11 +162,9 @@ def load_configuration(
         raise ValueError(f'seals has {twice[0]} and seal_chambers is given: set seal_chambers to [mounting]')
     paths = [config_path('seals', name) for name in selection.seals]
     documents = [read_yaml(path) for path in paths]
-    try:
+    with named_errors(', '.join(sorted({str(path) for path in paths}))):
         configuration = Configuration(*mounted(selection, documents), settings, feedforward, adaptation)
         configuration.parameters()
-    except ValueError as error:
-        raise ValueError(f'{", ".join(sorted({str(p) for p in paths}))}: {error}') from None
     return configuration
 
 
@@ -249,10 +244,8 @@ def read_machine(name: str) -> MachineFile:
     """
     path = config_path('machines', name)
     file = parse_machine(read_yaml(path), str(path))
-    try:
+    with named_errors(path):
         check_outputs(file)
-    except ValueError as error:
-        raise ValueError(f'{path}: {error}') from None
     return file._replace(actuators=tuple(_with_paths(one, path.parent) for one in file.actuators))
 
 
@@ -273,12 +266,10 @@ def machine_configurations(file: MachineFile, where: str) -> dict[str, Configura
     """
     configurations = {}
     for actuator in file.actuators:
-        try:
+        with named_errors(f'{where}: {actuator.name}'):
             configurations[actuator.name] = load_configuration(
                 actuator.selection, actuator.settings, actuator.feedforward, actuator.adaptation
             )
-        except ValueError as error:
-            raise ValueError(f'{where}: {actuator.name}: {error}') from None
     return configurations
 
 

@@ -29,9 +29,11 @@ from harness.processes import free_domain, play_live
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.files import config_path
 from seal_friction_ros.nodes.realtime import realtime_granted
-from seal_friction_ros.offline.bags.import_bag import import_bag
-from seal_friction_ros.offline.bags.import_log import import_log
+from seal_friction_ros.offline.bags.import_bag import convert_bag
+from seal_friction_ros.offline.bags.import_log import convert_log
 from seal_friction_ros.offline.bags.import_thesis import import_thesis
+from seal_friction_ros.offline.bags.mapped_bag import read_mapping
+from seal_friction_ros.offline.bags.rig_file import read_rig
 from seal_friction_ros.offline.replay.replay import replay
 from seal_friction_ros.offline.reports.bag_report import write_report
 from seal_friction_ros.offline.reports.page import ReportSummary
@@ -70,7 +72,7 @@ def inputs(folder: Path) -> Iterator[tuple[Path, float, dict[str, object]]]:
     yield folder / 'pull_test', PULL_TEST_RATE, {'seals': ['ms28775_114', 'ms28775_114']}
     rig = {'seals': [f'{config_path("seals", "delft_o_ring")}@a']}
     for log in sorted(RIG_LOGS.glob('O-ring*.csv')):
-        import_log(log, config_path('rigs', 'delft'), folder / log.stem)
+        convert_log(log, folder / log.stem, read_rig(config_path('rigs', 'delft')))
         yield folder / log.stem, RIG_RATE, rig
 
 
@@ -164,7 +166,7 @@ def machine_table(bags: dict[str, Path]) -> tuple[Table, bool]:
         table.add_column(Text(heading), justify='right' if heading.startswith('RMS') else 'left')
     all_same = True
     for name, bag in bags.items():
-        (found,) = import_bag(bag, MACHINE, bag.with_name(f'{bag.name}_imported')).values()
+        (found,) = convert_bag(bag, bag.with_name(f'{bag.name}_imported'), read_mapping(MACHINE)).values()
         error = 'unknown' if found.tracking_rms is None else f'{found.tracking_rms * 1e6:.0f}'
         all_same &= (same := identical(bag))
         table.add_row(name, error, 'identical' if same else 'DIFFERENT', str(bag.relative_to(ROOT)))

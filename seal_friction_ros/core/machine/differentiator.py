@@ -82,29 +82,18 @@ def chosen_differentiator(step: float, rate: float, noise: float) -> Differentia
         if found.noise <= noise:
             return found
         best = found
-    raise ValueError(
-        f'steps of {step:g} m at {rate:g} Hz: a velocity with {noise:g} m/s of noise would be older than '
-        f'{LONGEST_DELAY:g} s or need more than {MOST_SAMPLES} samples; {best.noise:.2g} m/s is possible: '
-        'raise noise, or use a finer encoder'
-    )
+    what = f'steps of {step:g} m at {rate:g} Hz: a velocity with {noise:g} m/s of noise would be older than'
+    possible = f'{best.noise:.2g} m/s is possible: raise noise, or use a finer encoder'
+    raise ValueError(f'{what} {LONGEST_DELAY:g} s or need more than {MOST_SAMPLES} samples; {possible}')
 
 
 def differentiate(
     differentiator: Differentiator, window: Window, stamp: int, position: float
 ) -> tuple[Window, float | None]:
-    """Take one sample.
+    """Take a sample of any position [m]; the next window, and the velocity [m/s], None until the window is full.
 
-    A repeated stamp is no new sample. A position that is not finite, a stamp that goes back, or a pause of more than
-    `LONGEST_GAP` periods begins a new window.
-
-    Args:
-        differentiator: From `chosen_differentiator`.
-        window: `NO_WINDOW`, or the one before.
-        stamp: Of the sample [ns].
-        position: [m], anything.
-
-    Returns:
-        The next window, and the velocity [m/s]; None until the window is full.
+    A repeated stamp [ns] is no new sample. A position that is not finite, a stamp that goes back, or a pause of more
+    than `LONGEST_GAP` periods begins a new window.
     """
     stamps, positions = window
     if not math.isfinite(position):

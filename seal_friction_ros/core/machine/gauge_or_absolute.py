@@ -6,13 +6,8 @@ A chamber without load is at ambient pressure: 0 Pa gauge, about 1e5 Pa absolute
 import math
 from typing import NamedTuple
 
-from seal_friction_ros.core.machine.machine_file import (
-    FLUID_PRESSURE,
-    STANDARD_ATMOSPHERE,
-    Actuator,
-    MachineFile,
-    Signal,
-)
+from seal_friction_ros.core.machine import machine_file
+from seal_friction_ros.core.machine.machine_file import Actuator, MachineFile, Signal
 from seal_friction_ros.core.messages.records import NEVER, Pressure
 
 LOWEST_GAUGE = -5e4  # [Pa] only a chamber that cavitates is nearer to vacuum
@@ -38,16 +33,11 @@ class Lowest(NamedTuple):
 
 
 def pressure_remarks(file: MachineFile, actuator: Actuator, lowest: Lowest) -> list[str]:
-    """What is likely to be wrong with ``absolute``, one line for each chamber.
+    """What the lowest pressures of an actuator say is likely to be wrong with ``absolute``, one line for each chamber.
 
     A ``sensor_msgs/FluidPressure`` is absolute by its definition, so ``absolute: false`` is doubted until a chamber
-    falls below ambient pressure. Other messages are gauge unless the file says otherwise. They are doubted only if
-    they fall to ambient pressure and never below it, since a chamber under load stays above.
-
-    Args:
-        file: The mapping file.
-        actuator: One of its actuators.
-        lowest: Its lowest pressures.
+    falls below ambient pressure. Other messages are gauge unless the file says otherwise. They are doubted only if they
+    fall to ambient pressure and never below it, since a chamber under load stays above.
     """
     signals = [actuator.inputs.get(name) for name in ('pressure_a', 'pressure_b')]
     measured = [low for low, signal in zip(lowest, signals, strict=True) if isinstance(signal, Signal)]
@@ -56,14 +46,12 @@ def pressure_remarks(file: MachineFile, actuator: Actuator, lowest: Lowest) -> l
     for name, signal, low in zip(('pressure_a', 'pressure_b'), signals, lowest, strict=True):
         if not isinstance(signal, Signal) or not math.isfinite(low):
             continue
-        highest = math.inf if file.topics[signal.topic] == FLUID_PRESSURE else HIGHEST_AMBIENT
+        highest = math.inf if file.topics[signal.topic] == machine_file.FLUID_PRESSURE else HIGHEST_AMBIENT
         if signal.absolute and low < LOWEST_GAUGE:
-            raw = low + STANDARD_ATMOSPHERE
+            raw = low + machine_file.STANDARD_ATMOSPHERE
             kpa = f'; if it is in kPa, write unit: kPa ({raw:.4g} in the message)' if raw > LOWEST_IN_KPA else ''
-            remarks.append(
-                f'{name} falls to {low:.3g} Pa with ambient pressure taken off: if it is gauge, write absolute: '
-                f'false{kpa}'
-            )
+            what = f'{name} falls to {low:.3g} Pa with ambient pressure taken off'
+            remarks.append(f'{what}: if it is gauge, write absolute: false{kpa}')
         elif not signal.absolute and not is_ever_unloaded and LOWEST_ABSOLUTE < low <= highest:
             remarks.append(f'{name} is never below {low:.3g} Pa: if it is absolute, write absolute: true')
     return remarks

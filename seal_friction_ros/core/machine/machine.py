@@ -26,6 +26,7 @@ from seal_friction_ros.core.estimation import pipeline
 from seal_friction_ros.core.estimation.configuration import Configuration
 from seal_friction_ros.core.estimation.feedforward import newest_force
 from seal_friction_ros.core.estimation.pipeline import ZERO_CELSIUS, PipelineParameters, PipelineState
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.machine.differentiator import NO_WINDOW, Differentiator, Window, differentiate
 from seal_friction_ros.core.machine.machine_file import Actuator, ForceSum, LoadTable, MachineFile, Signal
 from seal_friction_ros.core.messages.coder import DECODERS
@@ -163,15 +164,12 @@ class MachineState(NamedTuple):
 def make_machine(
     file: MachineFile, configurations: Mapping[str, Configuration], definitions: Mapping[str, Definition]
 ) -> Machine:
-    """Machine from its mapping file.
+    """Machine from its mapping file; ValueError, with topic and field, if a type is not known or has no such field.
 
     Args:
         file: The mapping.
         configurations: Name of each actuator -> its seals and settings.
         definitions: Type of each topic (``package/Name``) -> its definition; not used by the built-in mapping.
-
-    Raises:
-        ValueError: A type is not known, or has no such field; one line that names topic and field.
     """
     actuators = tuple(_actuator(mapping, file, configurations[mapping.name]) for mapping in file.actuators)
     if file.document is None:
@@ -188,13 +186,7 @@ def make_machine(
 
 
 def record_plan(topic: str, kind: str, numbers: Iterable[int]) -> TopicPlan:
-    """Plan of a topic whose messages are records of the estimator.
-
-    Args:
-        topic: Its name.
-        kind: Message type of this project.
-        numbers: Of the actuators that take each record.
-    """
+    """Plan of a topic whose messages are records of the estimator, for the actuators with these ``numbers``."""
     return TopicPlan(topic, DECODERS[kind], tuple((number, ()) for number in numbers), holds_records=True)
 
 
@@ -204,10 +196,8 @@ def _plan(
     if kind not in definitions:
         raise ValueError(f'{topic}: the type {kind} is neither installed nor defined in the bag')
     paths = list(dict.fromkeys(signal.field for _, _, signal in wanted))
-    try:
+    with named_errors(topic):
         reader = Reader(definitions[kind], kind, paths)
-    except ValueError as error:
-        raise ValueError(f'{topic}: {error}') from None
     taken: dict[int, list[_Taken]] = {}
     for number, quantity, signal in wanted:
         entry = _Taken(paths.index(signal.field), quantity, signal.gain, signal.offset)
@@ -216,25 +206,18 @@ def _plan(
 
 
 def _actuator(mapping: Actuator, file: MachineFile, configuration: Configuration) -> MachineActuator:
+    sources = {**mapping.sources(), 'ambient': file.ambient_pressure}
     constants = [math.nan] * len(QUANTITIES)
-    for name, source in mapping.inputs.items():
+    for name, source in sources.items():
         if isinstance(source, float):
             constants[_PLACE[name]] = source
-    force = mapping.force_sum
-    if force is not None and isinstance(force.load_force, float):
-        constants[_LOAD_FORCE] = force.load_force
-    if force is not None and force.weight is not None and isinstance(force.weight.angle, float):
-        constants[_ANGLE] = force.weight.angle
-    if isinstance(file.ambient_pressure, float):
-        constants[_AMBIENT] = file.ambient_pressure
-    if force is not None and force.holds_unknown_load:
+    if mapping.force_sum is not None and mapping.force_sum.holds_unknown_load:
         configuration = _with_load(configuration)
     signals = mapping.signals()
     absolute = frozenset(_PLACE[name] for name, signal in signals.items() if signal.absolute)
     wiring, parameters = _wiring(mapping, signals), configuration.parameters()
-    return MachineActuator(
-        mapping, wiring, tuple(constants), absolute, configuration, parameters, wiring.forces, wiring.motions
-    )
+    masks = wiring.forces, wiring.motions
+    return MachineActuator(mapping, wiring, tuple(constants), absolute, configuration, parameters, *masks)
 
 
 def _wiring(mapping: Actuator, signals: Mapping[str, Signal]) -> Wiring:
@@ -248,9 +231,8 @@ def _wiring(mapping: Actuator, signals: Mapping[str, Signal]) -> Wiring:
         if terms.spring or terms.load_over_position:
             force.add(_POSITION)
     reference = next((_PLACE[name] for name in ('reference_velocity', 'reference_position') if name in signals), -1)
-    return Wiring(
-        pressure, tuple(sorted(force)), reference, _PLACE['velocity' if 'velocity' in signals else 'position']
-    )
+    velocity = _PLACE['velocity' if 'velocity' in signals else 'position']
+    return Wiring(pressure, tuple(sorted(force)), reference, velocity)
 
 
 def _with_load(configuration: Configuration) -> Configuration:
@@ -285,7 +267,7 @@ def receive(
     emit: Emit,
     sent: int | None = None,
 ) -> MachineState:
-    """Take one message.
+    """Take one message; the next state.
 
     Args:
         machine: From `make_machine`.
@@ -295,9 +277,6 @@ def receive(
         received: When it was received [ns], on the clock of `pipeline.receive`.
         emit: Called with each answer.
         sent: When its publisher sent it [ns], as `pipeline.receive`.
-
-    Returns:
-        The next state.
     """
     if type(message) in KEPT:  # two of three messages: nothing in them can fail half-way
         for number, _ in plan.taken:
@@ -351,26 +330,14 @@ def memory_document(memory: Memory) -> dict[str, Any]:
 
 
 def parse_memory(document: Any) -> Memory:
-    """Memory from its document: inverse of `memory_document`.
-
-    Raises:
-        ValueError: It is not such a document.
-    """
+    """Memory from its document: inverse of `memory_document`; ValueError if it is not such a document."""
     try:
-        windows = [
-            Window(tuple(map(int, stamps)), tuple(map(float.fromhex, positions)))
-            for stamps, positions in document['windows']
-        ]
-        values, stamps = map(float.fromhex, document['values']), map(int, document['stamps'])
-        known = tuple(values), tuple(stamps)
-        if len(known[0]) == len(known[1]) == _OLDER_QUANTITIES:  # of a bag from before there was a temperature
-            known = (*known[0], math.nan), (*known[1], NEVER)
-        memory = Memory(
-            *known,
-            int(document['pressure_stamp']),
-            int(document['force_stamp']),
-            *windows,
-        )
+        given = [(document['stamps'], document['values']), *document['windows']]
+        (stamps, values), *parts = ((tuple(map(int, one)), tuple(map(float.fromhex, other))) for one, other in given)
+        if len(values) == len(stamps) == _OLDER_QUANTITIES:  # of a bag from before there was a temperature
+            values, stamps = (*values, math.nan), (*stamps, NEVER)
+        windows = [Window(*part) for part in parts]
+        memory = Memory(values, stamps, int(document['pressure_stamp']), int(document['force_stamp']), *windows)
     except (TypeError, LookupError, AttributeError, OverflowError) as error:
         raise ValueError(f'memory of an actuator: {type(error).__name__}: {error}') from None
     lengths = {len(memory.values), len(memory.stamps)}
@@ -380,16 +347,9 @@ def parse_memory(document: Any) -> Memory:
 
 
 def missing(machine: Machine, number: int, topic: str, data: bytes) -> list[str]:
-    """What a message does not hold that an actuator wants, for example another name of a joint; one text each.
+    """What a message on a topic of ``machine.plans`` does not hold that an actuator wants, for example a joint.
 
-    Args:
-        machine: The machine.
-        number: Of the actuator.
-        topic: One of ``machine.plans``.
-        data: The message.
-
-    Raises:
-        ValueError: As `receive`.
+    One text each. Raises ValueError if it does not match its type.
     """
     plan = machine.plans[topic]
     wanted = [entry.number for taker, entries in plan.taken if taker == number for entry in entries]
@@ -409,7 +369,7 @@ def records_of(
     stamp: int,
     frame_id: bytes,
 ) -> tuple[Memory, list[Input]]:
-    """Records that one message makes for an actuator, in the order in which the estimator takes them.
+    """Records that one message makes for an actuator, in the order in which the estimator takes them; the next memory.
 
     Args:
         actuator: The actuator.
@@ -500,11 +460,9 @@ def _pressures(actuator: MachineActuator, values: list[float], stamps: list[int]
     """
     ambient = 0.0
     if actuator.absolute:
-        ambient = values[_AMBIENT]
-        age = 0.0
+        ambient, age = values[_AMBIENT], 0.0
         if stamps[_AMBIENT] != NEVER:
-            newest = max([stamps[quantity] for quantity in actuator.absolute])
-            age = (newest - stamps[_AMBIENT]) * 1e-9
+            age = (max([stamps[quantity] for quantity in actuator.absolute]) - stamps[_AMBIENT]) * 1e-9
         if math.isnan(ambient) or abs(age) > AMBIENT_TIMEOUT:
             return None
     if _DIFFERENCE in actuator.wiring.pressure:
@@ -519,11 +477,7 @@ def force_sum(terms: ForceSum, mapping: Actuator, values: list[float], pressure:
 
     .. math:: \Sigma F = p_a A_a - p_b A_b + F_{load} - m g \sin\alpha - k (x - x_0) - F_L(x)
 
-    Args:
-        terms: Which terms there are.
-        mapping: The actuator, with its areas.
-        values: Of `QUANTITIES`.
-        pressure: Of both chambers [Pa, gauge].
+    The areas are those of ``mapping``, ``values`` are of `QUANTITIES`, the pressures of both chambers in [Pa, gauge].
     """
     total = 0.0
     if terms.pressures:
@@ -560,6 +514,5 @@ def _reference(
         if made is None:
             return window, None
         velocity = made
-    return window, ServoReference(
-        stamp, position, velocity, 0.0 if math.isnan(acceleration) else acceleration, frame_id
-    )
+    acceleration = 0.0 if math.isnan(acceleration) else acceleration
+    return window, ServoReference(stamp, position, velocity, acceleration, frame_id)

@@ -38,8 +38,8 @@ chamber a extends the rod; ``gain: -1.0`` inverts.
 """
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
@@ -47,6 +47,7 @@ from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.node_options import ADAPTATION_PREFIX, FEEDFORWARD_PREFIX
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.foundation.parameters import ParameterGroup, check_names, from_mapping, printable
 from seal_friction_ros.core.foundation.units import QUANTITIES, ZEROS, in_si, unit_meant
 from seal_friction_ros.core.machine.differentiator import Differentiator, chosen_differentiator
@@ -120,8 +121,7 @@ class Spring:
 class LoadTable:
     """Load over position, positive if it pushes the rod in, straight between its points; not known beyond them.
 
-    Raises:
-        ValueError: The positions do not increase, or there are not as many forces.
+    ValueError: the positions do not increase, or there are not as many forces.
     """
 
     positions: tuple[float, ...]  # [m]
@@ -129,10 +129,8 @@ class LoadTable:
 
     def __post_init__(self) -> None:
         if len(self.positions) < 2 or len(self.positions) != len(self.forces):
-            raise ValueError(
-                f'load_over_position has {len(self.positions)} positions and {len(self.forces)} forces: '
-                'give two or more of both'
-            )
+            counts = f'{len(self.positions)} positions and {len(self.forces)} forces'
+            raise ValueError(f'load_over_position has {counts}: give two or more of both')
         if any(b <= a for a, b in zip(self.positions, self.positions[1:], strict=False)):
             raise ValueError('load_over_position.positions do not increase')
 
@@ -180,13 +178,17 @@ class Actuator:
     feedforward: FeedForwardSettings
     adaptation: AdaptationSettings
 
-    def signals(self) -> dict[str, Signal]:
-        """Every signal of the actuator by name of its quantity."""
+    def sources(self) -> dict[str, Source | None]:
+        """Where each quantity of the actuator comes from, by its name."""
         sources: dict[str, Source | None] = dict(self.inputs)
         if self.force_sum is not None:
             weight = self.force_sum.weight
             sources |= {'load_force': self.force_sum.load_force, 'angle': weight.angle if weight else None}
-        return {name: source for name, source in sources.items() if isinstance(source, Signal)}
+        return sources
+
+    def signals(self) -> dict[str, Signal]:
+        """Every signal of the actuator by name of its quantity."""
+        return {name: source for name, source in self.sources().items() if isinstance(source, Signal)}
 
 
 class MachineFile(NamedTuple):
@@ -221,11 +223,9 @@ _FORCE_SUM = ('pressures', 'load_force', 'weight', 'spring', 'load_over_position
 def parse_machine(document: Any, where: str) -> MachineFile:
     """Mapping file from its YAML document; ``where`` names it in error messages.
 
-    Raises:
-        ValueError: A value is missing, unknown or invalid; one line that names file, actuator and key.
+    ValueError, which names file, actuator and key: a value is missing, unknown or invalid.
     """
-    check_mapping(document, where)
-    check_names(document, ('name', 'topics', 'ambient_pressure', 'answers', 'actuators'), where)
+    _check_names(document, ('name', 'topics', 'ambient_pressure', 'answers', 'actuators'), where)
     answers = document.get('answers', ANSWERS[0])
     if answers not in ANSWERS:
         raise ValueError(f'{where}: answers = {printable(str(answers))!r}: one of {", ".join(ANSWERS)}')
@@ -235,47 +235,33 @@ def parse_machine(document: Any, where: str) -> MachineFile:
         if not isinstance(topic, str) or not _TOPIC.fullmatch(topic):
             raise ValueError(f'{where}: topics: {printable(topic)!r} is not a topic: write it as /pressures')
         if not isinstance(kind, str) or not _TYPE.fullmatch(kind):
-            raise ValueError(
-                f'{where}: topics.{topic} = {printable(kind)!r} is not a type: write it as sensor_msgs/msg/JointState'
-            )
+            given = f'{where}: topics.{topic} = {printable(kind)!r}'
+            raise ValueError(f'{given} is not a type: write it as sensor_msgs/msg/JointState')
         topics[topic] = short_name(kind)
-    ambient = _source(
-        document.get('ambient_pressure', STANDARD_ATMOSPHERE), 'pressure', topics, f'{where}: ambient_pressure'
-    )
+    given = document.get('ambient_pressure', STANDARD_ATMOSPHERE)
+    ambient = _source(given, 'pressure', topics, f'{where}: ambient_pressure')
     if isinstance(ambient, float) and not 3e4 <= ambient <= 1.2e5:
         raise ValueError(f'{where}: ambient_pressure = {ambient:g} Pa is not between 3e4 and 1.2e5 Pa')
     if isinstance(ambient, Signal):
-        ambient = Signal(ambient.topic, ambient.field, ambient.gain, ambient.offset)
-    actuators = _mapping(document, 'actuators', where)
-    if not 1 <= len(actuators) <= MOST_ACTUATORS:
-        raise ValueError(f'{where}: actuators has {len(actuators)} entries: give 1 to {MOST_ACTUATORS}')
-    return MachineFile(
-        name,
-        topics,
-        ambient,
-        tuple(_actuator(key, value, topics, where) for key, value in actuators.items()),
-        answers == ANSWERS[1],
-        document,
-    )
+        ambient = replace(ambient, absolute=False)
+    entries = _mapping(document, 'actuators', where)
+    if not 1 <= len(entries) <= MOST_ACTUATORS:
+        raise ValueError(f'{where}: actuators has {len(entries)} entries: give 1 to {MOST_ACTUATORS}')
+    actuators = tuple(_actuator(key, value, topics, where) for key, value in entries.items())
+    return MachineFile(name, topics, ambient, actuators, answers == ANSWERS[1], document)
 
 
 def own_file(selection: SealSelection, topics: Mapping[str, str] = OWN_TOPICS) -> MachineFile:
     """The built-in mapping: one actuator without a name, whose messages are the records of this project.
 
-    Args:
-        selection: Its seals.
-        topics: Topic -> message type; a message of another project cannot be mapped.
+    ``topics``: topic -> message type; a message of another project cannot be mapped.
     """
     settings = EstimatorSettings(), FeedForwardSettings(), AdaptationSettings()
     return MachineFile('', topics, 0.0, (Actuator('', selection, {}, 0.0, 0.0, None, None, None, *settings),))
 
 
 def check_mapping(document: Any, where: str) -> None:
-    """Check that a document is a mapping.
-
-    Raises:
-        ValueError: It is not.
-    """
+    """Check that a document is a mapping; ValueError if it is not."""
     if not isinstance(document, Mapping):
         raise ValueError(f'{where} is not a mapping of names to values but {printable(document)[:60]!r}')
 
@@ -297,13 +283,10 @@ def _text(document: Mapping[Any, Any], key: str, where: str) -> str:
 
 def _number(value: Any, quantity: str, where: str, *, is_difference: bool = False) -> float:
     """Finite number in SI, or with a unit of its quantity."""
-    return _finite(in_si(value, QUANTITIES[quantity][0], where, is_difference=is_difference), where)
-
-
-def _finite(value: float, where: str) -> float:
-    if not abs(value) < 1e15:
-        raise ValueError(f'{where} = {value!r} is not a finite number below 1e15')
-    return float(value)
+    number = in_si(value, QUANTITIES[quantity][0], where, is_difference=is_difference)
+    if not abs(number) < 1e15:
+        raise ValueError(f'{where} = {number!r} is not a finite number below 1e15')
+    return float(number)
 
 
 def _positive(value: Any, quantity: str, where: str) -> float:
@@ -345,30 +328,27 @@ def _actuator(name: Any, document: Any, topics: Mapping[str, str], file: str) ->
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise ValueError(f'{file}: actuators: {printable(name)!r} is not a name of letters, digits and _')
     where = f'{file}: {name}'
-    check_mapping(document, where)
-    check_names(document, _ACTUATOR, where)
-    inputs_document = _mapping(document, 'inputs', where)
-    check_names(inputs_document, tuple(INPUTS), f'{where}: inputs')
-    inputs = {
-        key: _source(value, INPUTS[key], topics, f'{where}: inputs.{key}') for key, value in inputs_document.items()
-    }
+    _check_names(document, _ACTUATOR, where)
+    given = _mapping(document, 'inputs', where)
+    check_names(given, tuple(INPUTS), f'{where}: inputs')
+    inputs = {key: _source(value, INPUTS[key], topics, f'{where}: inputs.{key}') for key, value in given.items()}
     area_a, area_b = _areas(document, where)
     force_sum = None
     if 'force_sum' in document:
         force_sum = _force_sum(document['force_sum'], topics, f'{where}: force_sum')
     made = _settings(document.get('parameters', {}), f'{where}: parameters')
     actuator = Actuator(
-        name,
-        from_mapping(SealSelection, {'seals': document.get('seals')}, where),
-        inputs,
-        area_a,
-        area_b,
-        force_sum,
-        _differentiator(document, inputs, where),
-        _output(document['output'], f'{where}: output') if 'output' in document else None,
-        made[EstimatorSettings],
-        made[FeedForwardSettings],
-        made[AdaptationSettings],
+        name=name,
+        selection=from_mapping(SealSelection, {'seals': document.get('seals')}, where),
+        inputs=inputs,
+        area_a=area_a,
+        area_b=area_b,
+        force_sum=force_sum,
+        differentiator=_differentiator(document, inputs, where),
+        output=_output(document['output'], f'{where}: output') if 'output' in document else None,
+        settings=made[EstimatorSettings],
+        feedforward=made[FeedForwardSettings],
+        adaptation=made[AdaptationSettings],
     )
     _check_actuator(actuator, where)
     return actuator
@@ -389,10 +369,9 @@ def _areas(document: Mapping[str, Any], where: str) -> tuple[float, float]:
         if rod >= bore:
             raise ValueError(f'{where}: rod = {rod:g} m is not below bore = {bore:g} m')
         return circle(bore), circle(bore) - circle(rod)
-    areas = [
-        _positive(document[key], 'area', f'{where}: {key}') if key in document else 0.0 for key in ('area_a', 'area_b')
-    ]
-    return areas[0], areas[1]
+    given = (key for key in ('area_a', 'area_b') if key in document)
+    areas = {key: _positive(document[key], 'area', f'{where}: {key}') for key in given}
+    return areas.get('area_a', 0.0), areas.get('area_b', 0.0)
 
 
 def circle(diameter: float) -> float:
@@ -401,8 +380,7 @@ def circle(diameter: float) -> float:
 
 
 def _force_sum(document: Any, topics: Mapping[str, str], where: str) -> ForceSum:
-    check_mapping(document, where)
-    check_names(document, _FORCE_SUM, where)
+    _check_names(document, _FORCE_SUM, where)
     pressures, load = document.get('pressures', False), document.get('load', 'unknown')
     if not isinstance(pressures, bool):
         raise ValueError(f'{where}.pressures = {pressures!r} is not true or false')
@@ -436,10 +414,15 @@ def _spring(document: Any, where: str) -> Spring:
     return Spring(stiffness, _number(document['rest_position'], 'length', f'{where}.rest_position'))
 
 
-def _check_keys(document: Any, keys: tuple[str, ...], where: str) -> None:
-    """Check that a mapping has all of these keys, and no other."""
+def _check_names(document: Any, names: Collection[str], where: str) -> None:
+    """Check that a document is a mapping with none but these names."""
     check_mapping(document, where)
-    check_names(document, keys, where)
+    check_names(document, names, where)
+
+
+def _check_keys(document: Any, keys: tuple[str, ...], where: str) -> None:
+    """Check that a document is a mapping with all of these keys, and no other."""
+    _check_names(document, keys, where)
     missing = [key for key in keys if key not in document]
     if missing:
         raise ValueError(f'{where} lacks {", ".join(missing)}')
@@ -456,22 +439,18 @@ def _differentiator(document: Mapping[str, Any], inputs: Mapping[str, Source], w
     values = document.get('velocity_from_position')
     if values is None:
         raise ValueError(f'{where} lacks velocity_from_position: {{step: 5 um, rate: 500 Hz}}, of the encoder')
-    check_mapping(values, place)
-    check_names(values, ('step', 'rate', 'noise'), place)
+    _check_names(values, ('step', 'rate', 'noise'), place)
     step = _number(values.get('step'), 'length', f'{place}.step')
     rate = _positive(values.get('rate'), 'frequency', f'{place}.rate')
     noise = _positive(values.get('noise', VELOCITY_NOISE), 'velocity', f'{place}.noise')
     if step < 0.0 or not 1.0 <= rate <= 1e5:
         raise ValueError(f'{place}: step = {step:g} m is not 0 or more, or rate = {rate:g} Hz not within 1 to 1e5')
-    try:
+    with named_errors(place):
         return chosen_differentiator(step, rate, noise)
-    except ValueError as error:
-        raise ValueError(f'{place}: {error}') from None
 
 
 def _output(document: Any, where: str) -> Output:
-    check_mapping(document, where)
-    check_names(document, ('topic', 'type', 'gain', 'index', 'joint'), where)
+    _check_names(document, ('topic', 'type', 'gain', 'index', 'joint'), where)
     topic, kind = _text(document, 'topic', where), short_name(_text(document, 'type', where))
     if not _TOPIC.fullmatch(topic):
         raise ValueError(f'{where}.topic = {topic!r} is not a topic: write it as /boom/effort')
@@ -527,10 +506,8 @@ def _check_pressures(actuator: Actuator, where: str) -> None:
         raise ValueError(f'{where}: inputs lacks {missing}; write {missing}: 0.0 for a chamber that is open')
     on_chamber = sorted({'a', 'b'} & set(actuator.selection.seal_chambers))
     if difference and on_chamber:
-        raise ValueError(
-            f'{where}: a seal sees chamber {on_chamber[0]}, which pressure_difference does not tell: give pressure_a '
-            'and pressure_b'
-        )
+        what = f'a seal sees chamber {on_chamber[0]}, which pressure_difference does not tell'
+        raise ValueError(f'{where}: {what}: give pressure_a and pressure_b')
     if not any(isinstance(inputs.get(key), Signal) for key in ('pressure_a', 'pressure_b', 'pressure_difference')):
         raise ValueError(f'{where}: inputs has no pressure that comes in a message')
 

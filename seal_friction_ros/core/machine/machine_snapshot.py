@@ -103,15 +103,9 @@ def snapshot_of(machine: Machine, state: MachineState) -> MachineSnapshot:
 def machine_of(
     snapshot: MachineSnapshot, definitions: Mapping[str, Definition], topics: Mapping[str, str] | None = None
 ) -> tuple[Machine, MachineState]:
-    """Machine and state of a snapshot.
+    """Machine and state of a snapshot; ``topics`` -> message types replace those of the built-in mapping.
 
-    Args:
-        snapshot: From `parse_machine_text`.
-        definitions: Of the type of each topic, see `machine.make_machine`.
-        topics: Topic -> message type instead of those of the built-in mapping.
-
-    Raises:
-        ValueError: As `make_machine`.
+    Arguments and errors otherwise as of `make_machine`.
     """
     file = snapshot.file if topics is None else snapshot.file._replace(topics=topics)
     machine = make_machine(file, snapshot.configurations, definitions)
@@ -138,11 +132,7 @@ def machine_text(snapshot: MachineSnapshot) -> str:
 
 
 def parse_machine_text(text: str) -> MachineSnapshot:
-    """Snapshot from the text of `machine_text`.
-
-    Raises:
-        ValueError: The text is not such a snapshot, or a value in it is not valid.
-    """
+    """Snapshot from the text of `machine_text`; ValueError if it is none, or a value in it is not valid."""
     document = parse_json(text, 'configuration')
     if not isinstance(document, dict) or not {'machine', 'actuators'} & document.keys():
         return own_snapshot(parse_snapshot_document(document))

@@ -46,20 +46,15 @@ def commands(file: MachineFile, forces: Mapping[str, float], stamp: int) -> list
     for actuator in file.actuators:
         if actuator.output is not None:
             command = actuator.output.gain * forces.get(actuator.name, 0.0)
-            topics.setdefault(actuator.output.topic, []).append(
-                (actuator.output, command if math.isfinite(command) else 0.0)
-            )
+            part = actuator.output, command if math.isfinite(command) else 0.0
+            topics.setdefault(actuator.output.topic, []).append(part)
     return [Command(topic, parts[0][0].type_name, _encoded(parts, stamp)) for topic, parts in topics.items()]
 
 
 def due_commands(machine: Machine, state: MachineState, has_feedforward: bool, received: int) -> list[Command]:
-    """Commands after a message: if it made a feed-forward, or an actuator has failed, whose command is 0 then.
+    """Commands after a message that was received at a time [ns], if it made a feed-forward, or an actuator has failed.
 
-    Args:
-        machine: The machine.
-        state: After the message.
-        has_feedforward: Whether the message made one.
-        received: When the message was received [ns].
+    The command of an actuator that has failed is 0.
     """
     states = state.actuators
     if not has_feedforward and not any(known.fault for known in states):
@@ -69,11 +64,7 @@ def due_commands(machine: Machine, state: MachineState, has_feedforward: bool, r
 
 
 def check_outputs(file: MachineFile) -> None:
-    """Check that actuators which share a topic have places of their own in one type.
-
-    Raises:
-        ValueError: Two do not; names both.
-    """
+    """Check that actuators which share a topic have places of their own in one type; ValueError if not."""
     seen: dict[tuple[str, int, str], str] = {}
     types: dict[str, str] = {}
     for actuator in file.actuators:
@@ -84,9 +75,8 @@ def check_outputs(file: MachineFile) -> None:
             raise ValueError(f'{actuator.name}: output.type = {output.type_name}: {output.topic} has another type')
         place = output.topic, output.index, output.joint
         if place in seen:
-            raise ValueError(
-                f'{actuator.name} and {seen[place]} have the same place in {output.topic}: give another index or joint'
-            )
+            both = f'{actuator.name} and {seen[place]}'
+            raise ValueError(f'{both} have the same place in {output.topic}: give another index or joint')
         seen[place] = actuator.name
 
 

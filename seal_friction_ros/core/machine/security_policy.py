@@ -21,15 +21,7 @@ _SERVICES = (
 
 
 def security_policy(file: MachineFile, made_by: str) -> str:
-    """Policy of the node with a mapping file.
-
-    Args:
-        file: The mapping file.
-        made_by: Comment at the beginning.
-
-    Returns:
-        The policy as XML, for a node without a namespace.
-    """
+    """Policy of the node with a mapping file, without a namespace, as XML; ``made_by`` is its first comment."""
     answers = ['~/friction'] if file.together else [f'{a.name}/{topic}' for a in file.actuators for topic in OUTPUTS]
     commands = dict.fromkeys(actuator.output.topic for actuator in file.actuators if actuator.output)
     parts = [

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.messages import layouts
 from seal_friction_ros.core.messages.cdr import LITTLE_ENDIAN
@@ -54,8 +55,7 @@ class Messages(NamedTuple):
 
     def taken(self, first: int, end: int) -> 'Messages':
         """The messages from number ``first`` to before number ``end``."""
-        part = slice(first, end)
-        return self.in_order(part)
+        return self.in_order(slice(first, end))
 
     def in_order(self, order: slice | Integers) -> 'Messages':
         """Some of the messages, or all in another order."""
@@ -77,17 +77,7 @@ class Numbers(NamedTuple):
 
 
 def numbers_of(messages: Messages, kind: int, type_name: str, topic: str = '') -> Numbers:
-    """Numbers of all messages of a kind.
-
-    Args:
-        messages: Of several kinds.
-        kind: Of those that are wanted.
-        type_name: Their type, one of `LAYOUTS`.
-        topic: For errors.
-
-    Raises:
-        ValueError: One is malformed; names its topic and time.
-    """
+    """Numbers of all messages of a kind, of a type in `LAYOUTS`; ValueError, with topic and time, of a bad one."""
     layout = LAYOUT_OF[type_name]
     places = np.flatnonzero(messages.kinds == kind)
     offsets, sizes, data = messages.offsets[places], messages.sizes[places], messages.data
@@ -113,10 +103,8 @@ def numbers_of(messages: Messages, kind: int, type_name: str, topic: str = '') -
         is_usual &= np.isin(numbers[layout.fields.index('state')], list(FrictionState))
     for number in np.flatnonzero(~is_usual).tolist():  # of an older layout, or malformed
         place = int(places[number])
-        try:
+        with named_errors(f'message on {topic} at {messages.received[place]} ns'):
             stamps[number], *values = decode(type_name, messages.message(place))
-        except ValueError as error:
-            raise ValueError(f'message on {topic} at {messages.received[place]} ns: {error}') from None
         numbers[:, number] = values[: len(numbers)]
     return Numbers(places, stamps, numbers)
 

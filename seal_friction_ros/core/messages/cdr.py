@@ -34,12 +34,9 @@ class Place(NamedTuple):
 
 
 class Walk:
-    """Walks over the fields of one message and notes where they are.
+    """Walks over the fields of one message of ``end`` bytes and notes where they are.
 
-    Args:
-        definition: Of the message.
-        length_at: Length of the text or list that stands at an offset.
-        end: Size of the message [bytes].
+    ``length_at`` gives the length of the text or list that stands at an offset.
     """
 
     def __init__(self, definition: Definition, length_at: Callable[[int], int], end: int) -> None:
@@ -68,8 +65,7 @@ class Walk:
 
     def _one(self, kind: str) -> Any:
         if kind == STRING:
-            length = self._length()
-            return self._place('s', length)
+            return self._place('s', self._length())
         code = PRIMITIVES.get(kind)
         return self.message(kind) if code is None else self._place(code)
 
@@ -92,11 +88,7 @@ class Walk:
 
 
 def walked(definition: Definition, type_name: str, data: bytes) -> tuple[Walk, dict[str, Any]]:
-    """The walk over a message, and the places of its fields.
-
-    Raises:
-        ValueError: The bytes are not a message of the type.
-    """
+    """The walk over a message, and the places of its fields; ValueError if the bytes are not a message of the type."""
     if data[:2] != LITTLE_ENDIAN:
         raise ValueError(f'encapsulation {data[:4].hex()} is not little-endian CDR')
     walk = Walk(definition, lambda at: int.from_bytes(data[at : at + 4], 'little'), len(data))

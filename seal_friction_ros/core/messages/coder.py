@@ -61,11 +61,7 @@ def _decoder(layout: Layout) -> Callable[[bytes], Any]:
 
 
 def _struct_of_bytes(layout: Layout, data: bytes) -> struct.Struct:
-    """Format of messages with the size of this one and the length of its frame name.
-
-    Raises:
-        ValueError: No message has this size and this length.
-    """
+    """Format of messages with the size of this one and the length of its frame name; ValueError if there is none."""
     if len(data) < FRAME_AT:
         raise ValueError(f'{len(data)} bytes are too few for a stamped message')
     length = int.from_bytes(data[_FRAME_LENGTH], 'little')
@@ -103,11 +99,7 @@ def encode_text(text: str) -> bytes:
 
 
 def decode_text(data: bytes) -> str:
-    """EstimatorConfiguration from bytes.
-
-    Raises:
-        ValueError: The bytes are not such a message.
-    """
+    """EstimatorConfiguration from bytes; ValueError if they are not such a message."""
     _, root = walked(layouts.DEFINITIONS, layouts.CONFIGURATION_TYPE, data)
     begin, _, length = root['json']
     if not length:
@@ -116,11 +108,7 @@ def decode_text(data: bytes) -> str:
 
 
 def decode_clock(data: bytes) -> Clock:
-    """Simulated time from the bytes of a rosgraph_msgs/Clock.
-
-    Raises:
-        ValueError: The bytes are not such a message.
-    """
+    """Simulated time from the bytes of a rosgraph_msgs/Clock; ValueError if they are none."""
     if not _CLOCK.size <= len(data) <= _CLOCK.size + 3 or data[:2] != LITTLE_ENDIAN:
         raise ValueError(f'{len(data)} bytes are not a time in little-endian CDR')
     _, seconds, nanoseconds = _CLOCK.unpack_from(data)
@@ -138,11 +126,7 @@ DECODERS: dict[str, Callable[[bytes], Any]] = {
 
 
 def decode(message_type: str, data: bytes) -> Any:
-    """Record of a message.
-
-    Raises:
-        ValueError: The bytes are not a message of this type.
-    """
+    """Record of a message; ValueError if the bytes are not a message of this type."""
     return DECODERS[message_type](data)
 
 

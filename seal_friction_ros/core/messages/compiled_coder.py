@@ -79,10 +79,7 @@ def body_size(layout: Layout) -> int:
 def outbox_for(messages: Messages, is_answered: BoolArray, numbers_size: int) -> Outbox:
     """Empty outbox with room for an estimate and a feed-forward to each message that may be answered.
 
-    Args:
-        messages: All messages.
-        is_answered: Which of them.
-        numbers_size: Of the numbers of both answers [bytes].
+    ``numbers_size`` is that of the numbers of both answers [bytes].
     """
     heads = (np.minimum(messages.sizes[is_answered], _LARGEST) + 23) // 8 * 8  # at most that of the message and 12 more
     small = np.zeros(2 * int(heads.sum()) + len(heads) * numbers_size, np.uint8)

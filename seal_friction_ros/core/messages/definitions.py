@@ -84,18 +84,13 @@ def _parsed_field(line: str, owner: str, type_name: str) -> Field | None:
     kind, brackets, name, rest = matched.groups()
     if rest.startswith('='):
         return None
-    kind = _kind(kind)
+    kind = _SYNONYMS.get(kind, short_name(kind))
     if kind not in PRIMITIVES and kind not in (STRING, WIDE_STRING) and '/' not in kind:
         kind = f'{owner.partition("/")[0]}/{kind}'
     if brackets is None:
         return Field(name, kind)
     size = brackets[1:-1]
     return Field(name, kind, 'array', int(size)) if size.isdigit() else Field(name, kind, 'sequence')
-
-
-def _kind(name: str) -> str:
-    """The one name of a type that has several."""
-    return _SYNONYMS.get(name, short_name(name))
 
 
 def _checked(found: Mapping[str, tuple[Field, ...]], type_name: str) -> Definition:

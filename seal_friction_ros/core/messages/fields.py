@@ -19,6 +19,7 @@ import struct
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.foundation.parameters import printable
 from seal_friction_ros.core.messages.cdr import LITTLE_ENDIAN, Place, Walk, struct_at, walked
 from seal_friction_ros.core.messages.definitions import STRING, Definition, Field, short_name
@@ -50,11 +51,7 @@ _PART = re.compile(r'([A-Za-z]\w*)(?:\[([^\[\]]+)\])?(?:\.(?=.)|$)')
 
 
 def _resolved(definition: Definition, type_name: str, text: str) -> _Path:
-    """Path whose fields exist and that ends in a number.
-
-    Raises:
-        ValueError: It is not such a path; lists what the message has.
-    """
+    """Path whose fields exist and that ends in a number; ValueError, with what the message has, if it is none."""
     kind, position = short_name(type_name), 0
     steps: list[_Step] = []
     scopes = [kind]
@@ -67,13 +64,11 @@ def _resolved(definition: Definition, type_name: str, text: str) -> _Path:
         name, selector = matched.groups()
         field = next((f for f in definition.get(kind, ()) if f.name == name), None)
         if field is None:
-            known = f'{_fields_text(definition, kind)}{_meant(definition, kind, name)}'
-            raise ValueError(f'{what}: {kind} has no {name}: it has {known}')
+            meant = _meant([field.name for field in definition.get(kind, ())], name)
+            raise ValueError(f'{what}: {kind} has no {name}: it has {_fields_text(definition, kind)}{meant}')
         if bool(field.form) != (selector is not None):
-            hint = (
-                'is a list: choose an element, as [0] or [boom]' if field.form else 'is no list: leave out the brackets'
-            )
-            raise ValueError(f'{what}: {name} {hint}')
+            hint = 'a list: choose an element, as [0] or [boom]' if field.form else 'no list: leave out the brackets'
+            raise ValueError(f'{what}: {name} is {hint}')
         steps.append(_step(definition, field, selector, scopes, what))
         kind = field.kind
         if '/' in kind:
@@ -106,9 +101,9 @@ def _fields_text(definition: Definition, kind: str) -> str:
     return ', '.join(field.name for field in definition.get(kind, ()))
 
 
-def _meant(definition: Definition, kind: str, name: str) -> str:
-    close = difflib.get_close_matches(name, [field.name for field in definition.get(kind, ())], n=1)
-    return f'; did you mean {close[0]}?' if close else ''
+def _meant(known: Sequence[str], name: str) -> str:
+    close = difflib.get_close_matches(name, known, n=1)
+    return f'; did you mean {printable(close[0])}?' if close else ''
 
 
 # -- messages ---------------------------------------------------------------------------------------------------------
@@ -138,13 +133,8 @@ class Reading(NamedTuple):
 class Reader:
     """Reads the numbers that some paths name out of the messages of one type.
 
-    Args:
-        definition: Of the type.
-        type_name: The type.
-        paths: Of the numbers. None: encapsulation, numbers, lengths and texts (with their ends), in their order.
-
-    Raises:
-        ValueError: A path names no number of the message; lists what the message has.
+    Without paths: encapsulation, numbers, lengths and texts (with their ends), in their order. ValueError, which lists
+    what the message has: a path names no number of it.
     """
 
     def __init__(self, definition: Definition, type_name: str, paths: Sequence[str] | None = None) -> None:
@@ -156,11 +146,7 @@ class Reader:
         self._layouts: dict[int, _Layout] = {}
 
     def read(self, data: bytes) -> Reading:
-        """Read one message.
-
-        Raises:
-            ValueError: The bytes are not a message of the type; one line.
-        """
+        """Read one message; ValueError if the bytes are not a message of the type."""
         layout = self._layouts.get(len(data))
         if layout is None or layout.guard.unpack_from(data) != layout.expected:
             layout = self._walked(data)
@@ -180,13 +166,11 @@ class Reader:
         return Reading(stamp, frame_id, ordered, layout.missing)
 
     def _walked(self, data: bytes) -> _Layout:
-        try:
+        with named_errors(self.type_name):
             if len(data) > LARGEST_MESSAGE and not self._reads_all:
                 raise ValueError(f'{len(data)} bytes, more than {LARGEST_MESSAGE}')
             walk, root = walked(self._definition, self.type_name, data)
             return self._layout(walk, root, data)
-        except ValueError as error:
-            raise ValueError(f'{self.type_name}: {error}') from None
 
     def _layout(self, walk: Walk, root: Mapping[str, Any], data: bytes) -> _Layout:
         found = [_Found(data, root, path) for path in self._paths]
@@ -215,8 +199,7 @@ class Reader:
 def names_in(definition: Definition, type_name: str, data: bytes) -> list[str]:
     """Names that the elements of a message have, by the first list of `NAME_LISTS` that it has; empty without one.
 
-    Raises:
-        ValueError: The bytes are not a message of the type.
+    ValueError: the bytes are not a message of the type.
     """
     _, root = walked(definition, type_name, data)
     texts: list[Any] = next((root[name] for name in NAME_LISTS if isinstance(root.get(name), list)), [])
@@ -263,8 +246,6 @@ class _Found:
         if given:
             self.missing = f'{step.key!r} stands {given} times in {step.names or "name"}: ambiguous, none is taken'
             return -1
-        close = difflib.get_close_matches(str(step.key), names, n=1)
-        hint = f'; did you mean {printable(close[0])}?' if close else ''
         shown = ', '.join(printable(name) for name in names[:_SHOWN]) or 'none'
-        self.missing = f'no {step.key!r} in {step.names or "name"}: it has {shown}{hint}'
+        self.missing = f'no {step.key!r} in {step.names or "name"}: it has {shown}{_meant(names, str(step.key))}'
         return -1

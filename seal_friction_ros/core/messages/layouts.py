@@ -13,19 +13,9 @@ from typing import Any, NamedTuple
 
 from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages import records
 from seal_friction_ros.core.messages.cdr import ORIGIN, laid_out, struct_at
 from seal_friction_ros.core.messages.definitions import PRIMITIVES, Definition, Field, short_name
-from seal_friction_ros.core.messages.records import (
-    FeedForward,
-    Force,
-    FrictionEstimate,
-    Position,
-    Pressure,
-    ServoReference,
-    Temperature,
-    Velocity,
-    WatchdogTick,
-)
 
 PACKAGE = 'seal_friction_msgs'
 PRESSURE_TYPE = f'{PACKAGE}/msg/CylinderPressure'
@@ -99,15 +89,15 @@ class Layout(NamedTuple):
 
 
 LAYOUTS = (
-    Layout(PRESSURE_TYPE, Pressure, 'dd'),
-    Layout(FORCE_TYPE, Force, 'd'),
-    Layout(VELOCITY_TYPE, Velocity, 'd'),
-    Layout(POSITION_TYPE, Position, 'd'),
-    Layout(REFERENCE_TYPE, ServoReference, 'ddd'),
-    Layout(TEMPERATURE_TYPE, Temperature, 'dd'),
-    Layout(TICK_TYPE, WatchdogTick, 'd'),
-    Layout(ESTIMATE_TYPE, FrictionEstimate, 'ddddBbIddddd', lambda estimate: FrictionState(estimate.state), 8),
-    Layout(FEEDFORWARD_TYPE, FeedForward, 'ddI'),
+    Layout(PRESSURE_TYPE, records.Pressure, 'dd'),
+    Layout(FORCE_TYPE, records.Force, 'd'),
+    Layout(VELOCITY_TYPE, records.Velocity, 'd'),
+    Layout(POSITION_TYPE, records.Position, 'd'),
+    Layout(REFERENCE_TYPE, records.ServoReference, 'ddd'),
+    Layout(TEMPERATURE_TYPE, records.Temperature, 'dd'),
+    Layout(TICK_TYPE, records.WatchdogTick, 'd'),
+    Layout(ESTIMATE_TYPE, records.FrictionEstimate, 'ddddBbIddddd', lambda found: FrictionState(found.state), 8),
+    Layout(FEEDFORWARD_TYPE, records.FeedForward, 'ddI'),
 )
 LAYOUT_OF = {layout.message_type: layout for layout in LAYOUTS}
 
@@ -164,10 +154,8 @@ def numbers_at(frame_length: Any) -> Any:
 def struct_of(type_name: str, *lengths: int, numbers: int | None = None) -> struct.Struct:
     """Format of a message of this project, its encapsulation first, then numbers, lengths and texts in their order.
 
-    Args:
-        type_name: Its type.
-        lengths: Of its texts (with their ends) and lists, in their order.
-        numbers: How many numbers follow the frame name; None: all.
+    ``lengths`` are those of its texts (with their ends) and lists. After the frame name follow so many ``numbers``;
+    None: all.
     """
     places = laid_out(DEFINITIONS, type_name, lengths)
     return struct_at(places if numbers is None else places[: HEAD + numbers])

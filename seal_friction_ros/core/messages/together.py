@@ -53,8 +53,7 @@ def encode_together(answers: Sequence[NamedAnswer]) -> bytes:
 def _together(*parts: tuple[tuple[str, int], ...]) -> tuple[struct.Struct, list[list[Any]]]:
     """Format of a message, and what stands before the answers of each kind: counts and names.
 
-    Args:
-        parts: Of each kind: name of each actuator, and length of its frame name with its end.
+    Each kind has a part: name of each actuator, and length of its frame name with its end.
     """
     lengths, heads = [1], []
     for part in parts:
@@ -66,11 +65,7 @@ def _together(*parts: tuple[tuple[str, int], ...]) -> tuple[struct.Struct, list[
 
 
 def decode_together(data: bytes) -> list[NamedAnswer]:
-    """The answers in a message, estimates first: inverse of `encode_together`.
-
-    Raises:
-        ValueError: The bytes are not such a message.
-    """
+    """The answers in a message, estimates first: inverse of `encode_together`; ValueError if there are none."""
     values: Iterator[Any] = islice(_MACHINE.read(data).numbers, 5, None)  # behind the header
     answers: list[NamedAnswer] = []
     for record, numbers in _COUNTS.items():
@@ -106,11 +101,7 @@ def encode_newest(messages: Iterable[TopicMessage]) -> bytes:
 
 
 def decode_newest(data: bytes) -> list[TopicMessage]:
-    """The messages in one: inverse of `encode_newest`.
-
-    Raises:
-        ValueError: The bytes are not such a message.
-    """
+    """The messages in one: inverse of `encode_newest`; ValueError if it is not such a message."""
     values: Iterator[Any] = iter(_NEWEST.read(data).numbers[1:])
     labels = [(_text(values), *islice(values, 2)) for _ in range(next(values))]
     _, total, together = values

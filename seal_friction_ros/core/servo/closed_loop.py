@@ -21,15 +21,7 @@ from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.friction.force_sum_correction import measured_force_sum
-from seal_friction_ros.core.messages.records import (
-    FeedForward,
-    Force,
-    Input,
-    Output,
-    Pressure,
-    ServoReference,
-    Velocity,
-)
+from seal_friction_ros.core.messages import records
 from seal_friction_ros.core.servo import position_servo as servo
 from seal_friction_ros.core.servo.controller import Measurement
 from seal_friction_ros.core.servo.cylinder import pressure_force
@@ -121,11 +113,11 @@ def run_closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: F
     estimation = pipeline.init_running(parameters)
     state = servo.init(plant, wave.at(0.0).position)
     out = servo.outputs(plant, state.plant)
-    newest = FeedForward(0, 0.0, 0.0, 0)
+    newest = records.FeedForward(0, 0.0, 0.0, 0)
 
-    def emit(record: Output, _: bytes) -> None:
+    def emit(record: records.Output, _: bytes) -> None:
         nonlocal newest
-        newest = record if isinstance(record, FeedForward) else newest
+        newest = record if isinstance(record, records.FeedForward) else newest
 
     rows = []
     for i in range(samples):
@@ -139,12 +131,10 @@ def run_closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: F
         if sensors.encoder_step:
             counts.append(sensors.encoder_step * round(out.position / sensors.encoder_step))
             velocity = (counts[-1] - counts[0]) / (max(len(counts) - 1, 1) * period)
-        messages: list[Input] = [
-            Pressure(stamp, *pressures),
-            Force(stamp, measured_force_sum(lacking, force_sum, out.pressure_a, out.pressure_b) + f),
-        ]
-        messages += [ServoReference(stamp, *setpoint), Velocity(stamp, velocity)]
-        for message in messages:
+        force_sum = measured_force_sum(lacking, force_sum, out.pressure_a, out.pressure_b) + f
+        inputs = records.Pressure(stamp, *pressures), records.Force(stamp, force_sum)
+        motion = records.ServoReference(stamp, *setpoint), records.Velocity(stamp, velocity)
+        for message in (*inputs, *motion):
             pipeline.receive(parameters, estimation, message, stamp, emit)
         forces.append(newest.force)
         force = (1.0 - part) * forces[-1 - back] + part * forces[-2 - back]
@@ -190,15 +180,13 @@ class EvaluationMotions:
     def runs(self, axis: Axis, delay: float, noise: FloatArray | None = None) -> tuple[AxisRun, AxisRun, AxisRun]:
         """Sine, move and step; arguments as of `run_closed_loop`."""
         period, rest = axis.servo.control_period, SETTLING_TIME + self.hold_time
-        motions: tuple[tuple[Wave, float], ...] = (
-            (StoppedWave(self.sine, self.stop_time), self.stop_time),
-            (self.move, self.move.duration),
-            (Step(self.sine.amplitude, STEP_START, self.sine.offset), STEP_START),
-        )
-        sine, move, step = (
-            run_closed_loop(axis, wave, round((time + rest) / period), delay, noise) for wave, time in motions
-        )
-        return sine, move, step
+
+        def run(wave: Wave, time: float) -> AxisRun:
+            return run_closed_loop(axis, wave, round((time + rest) / period), delay, noise)
+
+        step = Step(self.sine.amplitude, STEP_START, self.sine.offset)
+        stopped = StoppedWave(self.sine, self.stop_time)
+        return run(stopped, self.stop_time), run(self.move, self.move.duration), run(step, STEP_START)
 
     def evaluated_part(self, run: AxisRun) -> AxisRun:
         """Evaluated part of the sine: whole periods, between passages through the middle."""
@@ -229,15 +217,11 @@ class Performance(NamedTuple):
 
 
 def dwell(velocity: FloatArray, period: float, turns: int) -> float:
-    """Time at rest per reversal of the reference [s].
+    """Time at rest per reversal of the reference [s]; of the reference there are so many ``turns``.
 
     Every rest counts, also a second one within a stroke, and one without a reversal of the rod: a rod that never moves
-    dwells for the whole time between two reversals.
-
-    Args:
-        velocity: Of a simulated rod, exactly 0 at rest [m/s], shape (n,).
-        period: Sample time [s].
-        turns: Reversals of the reference in these samples.
+    dwells for the whole time between two reversals. The velocity [m/s], shape (n,), is that of a simulated rod, exactly
+    0 at rest, with the sample time ``period`` [s].
     """
     return float(np.count_nonzero(velocity == 0.0)) * period / turns
 

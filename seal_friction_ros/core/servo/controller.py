@@ -162,13 +162,7 @@ def oil_opening(
     Q is the flow into chamber a; alpha_A Q leaves chamber b. V_a and V_b are those in mid-stroke. The last line inverts
     both orifices at even speed.
 
-    Args:
-        valve: The valve.
-        cylinder: The cylinder.
-        bandwidth: omega_F [rad/s].
-        measured: By the sensors.
-        force: Force command F [N].
-        speed: v_c [m/s].
+    ``bandwidth`` is omega_F [rad/s], ``force`` the command F [N], ``speed`` v_c [m/s].
     """
     ratio = cylinder.area_ratio
     both = 1.0 + ratio * ratio * (cylinder.mid_volume_a / cylinder.mid_volume_b)
@@ -204,14 +198,8 @@ def air_gains(
 
     with absolute pressures, supply to chamber a and chamber b to exhaust while the rod ``extends``, and the other way
     round. A tenth of the supply pressure is the least f p_0, so that a chamber that is full, or fuller than its source
-    (psi < 0), does not ask for an infinite opening (our choice).
-
-    Args:
-        valve: The valve.
-        cylinder: The cylinder.
-        pressures: Of chamber a and b [Pa, gauge].
-        position: [m].
-        extends: Whether the valve opens supply to chamber a.
+    (psi < 0), does not ask for an infinite opening (our choice). The pressures of both chambers are in [Pa, gauge], the
+    position is in [m].
 
     Source: linearising feedback as in [Richer2000]_.
     """

@@ -19,9 +19,8 @@ class Cylinder(CheckedParameters):
     The stroke runs from -stroke/2 to +stroke/2; chamber a extends the rod (positive). The rod of a single-rod cylinder
     goes through chamber b.
 
-    Raises:
-        ValueError: A value is out of bounds, the type is unknown, the bore is not wider than the rod, or the dead
-            volume is too small.
+    ValueError: a value is out of bounds, the type is unknown, the bore is not wider than the rod, or the dead volume is
+    too small.
     """
 
     type: str = parameter(BALANCED, unit='', description='balanced (two equal areas) or single_rod.')
@@ -44,15 +43,12 @@ class Cylinder(CheckedParameters):
         super().__post_init__()
         if self.type not in CYLINDER_TYPES:
             raise ValueError(f'Cylinder.type = {self.type!r} is none of {", ".join(CYLINDER_TYPES)}')
-        if self.bore_diameter <= self.rod_diameter:
-            raise ValueError(
-                f'Cylinder.bore_diameter = {self.bore_diameter} m is not above rod_diameter = {self.rod_diameter} m'
-            )
-        if self.dead_volume < 0.01 * self.area_a * self.stroke:
-            raise ValueError(
-                f'Cylinder.dead_volume = {self.dead_volume} m3 is below 1 % of the swept volume '
-                f'{self.area_a * self.stroke:.3g} m3: a chamber without volume is infinitely stiff'
-            )
+        bore, rod, swept = self.bore_diameter, self.rod_diameter, self.area_a * self.stroke
+        if bore <= rod:
+            raise ValueError(f'Cylinder.bore_diameter = {bore} m is not above rod_diameter = {rod} m')
+        if self.dead_volume < 0.01 * swept:
+            what = f'{self.dead_volume} m3 is below 1 % of the swept volume {swept:.3g} m3'
+            raise ValueError(f'Cylinder.dead_volume = {what}: a chamber without volume is infinitely stiff')
 
     @property
     def area_a(self) -> float:

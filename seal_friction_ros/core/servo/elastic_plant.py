@@ -17,12 +17,7 @@ from typing import Any, NamedTuple
 
 from seal_friction_ros.core.foundation.compiled import compiled, for_compiler
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
-from seal_friction_ros.core.friction.actuator import (
-    NO_SEALS,
-    MountedSeal,
-    friction_of_seals,
-    sliding_friction_of_seals,
-)
+from seal_friction_ros.core.friction.actuator import NO_SEALS, MountedSeal, friction_of_seals, sliding_friction_of_seals
 from seal_friction_ros.core.friction.presliding import (
     NOT_SHEARED,
     LuGreNumbers,
@@ -42,11 +37,7 @@ MOST_GROUPS = 2
 
 @dataclass(frozen=True)
 class ElasticSeals(CheckedParameters):
-    """Elasticity of the seals of a simulated servo.
-
-    Raises:
-        ValueError: A value is out of bounds.
-    """
+    """Elasticity of the seals of a simulated servo."""
 
     first: Presliding
     second: Presliding | None = None
@@ -79,17 +70,14 @@ class ElasticSeals(CheckedParameters):
 def elastic_seals(seals: tuple[MountedSeal, ...]) -> ElasticSeals | None:
     """Elasticity by the seal files of an actuator: one group for each of two seals; None if no file has one.
 
-    Raises:
-        ValueError: Only some files have one, or there are more than two seals.
+    ValueError: only some files have one, or there are more than two seals.
     """
     found = [mounted.seal.presliding for mounted in seals if mounted.seal.presliding]
     if not found:
         return None
     if len(found) != len(seals) or len(found) > MOST_GROUPS:
-        raise ValueError(
-            f'{len(found)} of {len(seals)} seal files have presliding: the simulated servo takes one or two seals, '
-            'each with presliding'
-        )
+        taken = 'the simulated servo takes one or two seals, each with presliding'
+        raise ValueError(f'{len(found)} of {len(seals)} seal files have presliding: {taken}')
     return ElasticSeals(found[0], found[1] if len(found) > 1 else None, 1.0 / len(found))
 
 
@@ -102,23 +90,18 @@ def seals_of_plant(elasticity: str, seals: tuple[MountedSeal, ...], mass: float)
     r"""Elasticity by its name in `ELASTICITIES`; None for rigid seals.
 
     The bristles of LuGre damp the mass [kg] on them to half of critical, :math:`\sigma_1 = \sqrt{K m}` (our choice).
-
-    Raises:
-        ValueError: The seal files do not tell the elasticity.
+    ValueError: the seal files do not tell the elasticity.
     """
     if elasticity == RIGID:
         return None
     found = elastic_seals(seals)
     if found is None:
-        raise ValueError(
-            f'seals {elasticity}: no seal file has presliding: identify it (seal_friction identify --presliding), or '
-            f'take {RIGID} seals'
-        )
+        hint = f'identify it (seal_friction identify --presliding), or take {RIGID} seals'
+        raise ValueError(f'seals {elasticity}: no seal file has presliding: {hint}')
     if elasticity == ELEMENTS:
         return found
-    return ElasticSeals(
-        replace(found.first, stiffness=found.stiffness), bristle_damping=math.sqrt(found.stiffness * mass)
-    )
+    whole = replace(found.first, stiffness=found.stiffness)
+    return ElasticSeals(whole, bristle_damping=math.sqrt(found.stiffness * mass))
 
 
 class ElasticNumbers(NamedTuple):
@@ -150,18 +133,11 @@ def sheared(elastic: Any, state: SealShear, slide: Slide, velocity: float) -> Se
     if elastic.is_lugre:
         deflection, friction = lugre(elastic.lugre, state.deflection, displacement, velocity, coulomb + excess)
         return SealShear(state.first, state.second, deflection, friction)
-    share = elastic.first_share
-    first, force = shear(
-        elastic.first,
-        state.first,
-        Slide(displacement, elapsed, share * coulomb, share * excess, share * stiction),
-    )
-    rest = 1.0 - share
-    second, force_of_rest = shear(
-        elastic.second,
-        state.second,
-        Slide(displacement, elapsed, rest * coulomb, rest * excess, rest * stiction),
-    )
+    share, rest = elastic.first_share, 1.0 - elastic.first_share
+    slide = Slide(displacement, elapsed, share * coulomb, share * excess, share * stiction)
+    first, force = shear(elastic.first, state.first, slide)
+    slide = Slide(displacement, elapsed, rest * coulomb, rest * excess, rest * stiction)
+    second, force_of_rest = shear(elastic.second, state.second, slide)
     return SealShear(first, second, 0.0, force + force_of_rest)
 
 
@@ -199,14 +175,7 @@ def elastic_step(
 ) -> tuple[PlantState, SealShear]:
     """Valve, chambers, rod and seals after ``h`` [s]; Runge-Kutta of fourth order.
 
-    Args:
-        c: Parameters of the plant.
-        seal_less: Elasticity, and ``c`` without seals, from `for_elastic_step`.
-        plant: Valve, chambers and rod.
-        seals: State of the seals.
-        command: Of the spool [-1 to 1].
-        load_force: From outside [N].
-        h: [s].
+    ``seal_less`` is from `for_elastic_step`; the command is of the spool [-1 to 1], the load force [N] from outside.
     """
     elastic, bare = seal_less
     y = plant[:10]

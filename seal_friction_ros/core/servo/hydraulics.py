@@ -20,11 +20,7 @@ from seal_friction_ros.core.servo.cylinder import Cylinder
 
 @dataclass(frozen=True)
 class ServoValve(CheckedParameters):
-    """Four-way servo valve with critical lap, and its supply pressure.
-
-    Raises:
-        ValueError: A value is out of bounds, or supply is below return pressure.
-    """
+    """Four-way servo valve with critical lap, and its supply pressure, which is not below the return pressure."""
 
     supply_pressure: float = parameter(1000.0 * PSI, unit='Pa', lower=0.0, upper=1e8, description='Supply, gauge.')
     return_pressure: float = parameter(1e5, unit='Pa', lower=0.0, upper=1e8, description='Return, gauge.')
@@ -44,10 +40,8 @@ class ServoValve(CheckedParameters):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.supply_pressure < self.return_pressure:
-            raise ValueError(
-                f'ServoValve.supply_pressure = {self.supply_pressure} Pa is below '
-                f'return_pressure = {self.return_pressure} Pa'
-            )
+            limit = f'return_pressure = {self.return_pressure} Pa'
+            raise ValueError(f'ServoValve.supply_pressure = {self.supply_pressure} Pa is below {limit}')
 
     @property
     def orifice_gain(self) -> float:
@@ -127,18 +121,12 @@ def oil_rates(
 
     density_a, density_b = math.exp(a / beta), math.exp(b / beta)
     of_supply, of_return = enthalpies
-    power_in = density_a * (supply_a * of_supply + return_a * of_return) + density_b * (
-        supply_b * of_supply + return_b * of_return
-    )
+    power_in = density_a * (supply_a * of_supply + return_a * of_return)
+    power_in = power_in + density_b * (supply_b * of_supply + return_b * of_return)
     into_chambers = beta * ((density_a - 1.0) * flow_a + (density_b - 1.0) * flow_b)
-    return ChamberRates(
-        beta / oil_a * (charge_flow_a - cylinder.area_a * velocity),
-        beta / oil_b * (charge_flow_b + cylinder.area_b * velocity),
-        0.0,
-        0.0,
-        power_in,
-        power_in - into_chambers,
-    )
+    rate_a = beta / oil_a * (charge_flow_a - cylinder.area_a * velocity)
+    rate_b = beta / oil_b * (charge_flow_b + cylinder.area_b * velocity)
+    return ChamberRates(rate_a, rate_b, 0.0, 0.0, power_in, power_in - into_chambers)
 
 
 @compiled

@@ -63,10 +63,8 @@ class Trapezoid(CheckedParameters):
     """Strokes out and back with a rest at both ends, ``cycles`` times: a trapezoid of position with rounded corners.
 
     A cycle is: move by ``distance``, rest, move back, rest; the two equal rests fill the period. A move runs at
-    ``speed`` between ramps of ``acceleration`` and takes distance / speed + speed / acceleration.
-
-    Raises:
-        ValueError: A value is out of bounds, the speed is not reached, or the moves do not fit into the period.
+    ``speed`` between ramps of ``acceleration`` and takes distance / speed + speed / acceleration. ValueError if the
+    speed is not reached, or the moves do not fit into the period.
     """
 
     distance: float = parameter(0.0018, unit='m', lower=1e-6, upper=10.0, description='Stroke from end to end.')
@@ -79,15 +77,11 @@ class Trapezoid(CheckedParameters):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.speed**2 / self.acceleration > self.distance:
-            raise ValueError(
-                f'Trapezoid.speed = {self.speed} m/s is not reached within distance = {self.distance} m '
-                f'at acceleration = {self.acceleration} m/s2'
-            )
+            way = f'distance = {self.distance} m at acceleration = {self.acceleration} m/s2'
+            raise ValueError(f'Trapezoid.speed = {self.speed} m/s is not reached within {way}')
         if 2.0 * self.move_time > 1.0 / self.frequency:
-            raise ValueError(
-                f'Trapezoid.frequency = {self.frequency} Hz leaves {0.5 / self.frequency:.4g} s for a move that takes '
-                f'{self.move_time:.4g} s'
-            )
+            left = f'{0.5 / self.frequency:.4g} s for a move that takes {self.move_time:.4g} s'
+            raise ValueError(f'Trapezoid.frequency = {self.frequency} Hz leaves {left}')
 
     @property
     def move_time(self) -> float:
@@ -170,9 +164,8 @@ class RoundedWave:
         i = round(time / self.period)
         newest, last, before = (self._steps((i - back) * self.period) for back in range(3))
         speed = self.resolution / self.period  # of one step a sample
-        return Setpoint(
-            self.resolution * newest, speed * (newest - last), speed / self.period * (newest - 2 * last + before)
-        )
+        acceleration = speed / self.period * (newest - 2 * last + before)
+        return Setpoint(self.resolution * newest, speed * (newest - last), acceleration)
 
     def _steps(self, time: float) -> int:
         return round(self.wave.at(time).position / self.resolution)

@@ -84,13 +84,7 @@ def iso6358_flow(
 
     .. math:: \dot m = C p_1 \rho_0 \sqrt{T_0 / T_1}\, \psi(p_2 / p_1) \quad (p_1 \ge p_2)
 
-    Args:
-        valve: b and laminar ratio.
-        conductance: C [m^3/(s Pa)].
-        pressure_1: [Pa, absolute], > 0.
-        temperature_1: [K].
-        pressure_2: [Pa, absolute], > 0.
-        temperature_2: [K].
+    The conductance C is in [m^3/(s Pa)], the pressures, > 0, in [Pa, absolute], the temperatures in [K].
 
     Source: [ISO6358]_ part 1, with rho_0 and T_0 of ISO 8778.
     """
@@ -118,16 +112,8 @@ def chamber_rates(
         \dot p &= [(\gamma - 1) P - \gamma p \dot V] / V \\
         \dot T &= T\, (\dot p / p + \dot V / V - R T \dot m / (p V))
 
-    with the sum over the lands to supply and exhaust, and T_up the temperature where the air comes from.
-
-    Args:
-        valve: The valve.
-        supply_opening: Of the land to the supply [-] 0 to 1.
-        exhaust_opening: Of the land to the exhaust [-] 0 to 1.
-        pressure: [Pa, gauge].
-        temperature: [K].
-        volume: [m^3].
-        growth: Rate of the volume [m^3/s].
+    with the sum over the lands to supply and exhaust, whose openings [-] are 0 to 1, and T_up the temperature where the
+    air comes from. Pressure in [Pa, gauge], temperature in [K], volume in [m^3], its ``growth`` in [m^3/s].
 
     Source: energy and mass of an ideal gas, [Beater2007]_ chapter 4.
     """

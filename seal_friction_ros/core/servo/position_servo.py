@@ -73,34 +73,27 @@ class ServoParameters(CheckedParameters):
     def __post_init__(self) -> None:
         super().__post_init__()
         steps = round(self.control_period / self.inner_step)
+        step = f'inner_step = {self.inner_step} s'
         if steps < 1 or abs(steps * self.inner_step - self.control_period) > 1e-9 * self.control_period:
-            raise ValueError(
-                f'ServoParameters.control_period = {self.control_period} s is not a multiple of '
-                f'inner_step = {self.inner_step} s'
-            )
+            raise ValueError(f'ServoParameters.control_period = {self.control_period} s is not a multiple of {step}')
         rate, part = fastest_rate(self.valve, self.cylinder, self.load, self.seals)
-        if rate * self.inner_step > LARGEST_RATE_TIMES_STEP:
-            raise ValueError(
-                f'ServoParameters.inner_step = {self.inner_step} s is too long: at most '
-                f'{LARGEST_RATE_TIMES_STEP / rate:.3g} s for the fastest part, {part}'
-            )
+        limits = [(rate, f'fastest part, {part}')]
         if self.elastic is not None:
             damping = max(self.elastic.bristle_damping, 0.0) / self.load.mass
             swing = math.sqrt(self.elastic.stiffness / self.load.mass) + damping
-            if swing * self.inner_step > LARGEST_RATE_TIMES_STEP:
-                raise ValueError(
-                    f'ServoParameters.inner_step = {self.inner_step} s is too long: at most '
-                    f'{LARGEST_RATE_TIMES_STEP / swing:.3g} s for the mass on its elastic seals'
-                )
+            limits.append((swing, 'mass on its elastic seals'))
+        for rate, part in limits:
+            if rate * self.inner_step > LARGEST_RATE_TIMES_STEP:
+                longest = f'{LARGEST_RATE_TIMES_STEP / rate:.3g} s for the {part}'
+                raise ValueError(f'ServoParameters.{step} is too long: at most {longest}')
         c = constants(self.valve, self.cylinder, self.load, self.seals)
         elastic = for_elastic_step(self.elastic, c)
         g = gains(self.controller, c, self.control_period)
         radius = spectral_radius(g, c)
         if radius > 1.0 + 1e-9:
-            raise ValueError(
-                f'ServoParameters: the closed loop is unstable, the largest eigenvalue of its transition matrix is '
-                f'{radius:.4f}: lower position_gain, velocity_compensation or force_bandwidth, or control_period'
-            )
+            what = f'unstable, the largest eigenvalue of its transition matrix is {radius:.4f}'
+            hint = 'lower position_gain, velocity_compensation or force_bandwidth, or control_period'
+            raise ValueError(f'ServoParameters: the closed loop is {what}: {hint}')
         for name, value in (('constants', c), ('gains', g), ('kept', keep((c, g, self.inner_step, steps, elastic)))):
             object.__setattr__(self, name, value)  # frozen dataclass: derived fields
 
@@ -134,11 +127,7 @@ NO_COMMAND = Command(0.0, 0.0, 0)
 
 
 def init(parameters: ServoParameters, position: float = 0.0) -> ServoState:
-    """Servo at rest at ``position`` [m], valve closed, chambers at `pressures_at_rest`.
-
-    Raises:
-        ValueError: The position is not between the end stops.
-    """
+    """Servo at rest at ``position`` [m], valve closed, chambers at `pressures_at_rest`; ValueError beyond a stop."""
     if not abs(position) <= parameters.cylinder.limit:
         raise ValueError(f'position = {position} m is not within the stroke, +-{parameters.cylinder.limit} m')
     a, b = pressures_at_rest(parameters.valve, parameters.cylinder)
@@ -180,8 +169,7 @@ def _advance(kept: Any, plant: PlantState, command: float, load_force: float) ->
 def advance(parameters: ServoParameters, state: PlantState, spool: float, load_force: float = 0.0) -> PlantState:
     """Valve, cylinder and load over one sample, with constant spool command [-1 to 1] and force on the rod [N].
 
-    Raises:
-        ValueError: The seals are elastic: their state is in `ServoState`, so `step` it.
+    ValueError: the seals are elastic: their state is in `ServoState`, so `step` it.
     """
     if parameters.elastic is not None:
         raise ValueError('advance: the seals of this servo are elastic; use step, or ServoParameters.elastic = None')

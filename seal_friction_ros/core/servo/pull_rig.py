@@ -29,10 +29,7 @@ def pull_rig(plan: PullTest, seals: tuple[MountedSeal, ...], period: float) -> P
     """Rig for a plan, with the sample time ``period`` [s].
 
     Supply and return are one line. The valve is wide and fully open, so it hardly brakes the rod. Sizes of valve and
-    hoses are our choice.
-
-    Raises:
-        ValueError: The period is too long for the plant.
+    hoses are our choice. ValueError: the period is too long for the plant.
     """
 
     def servo(pressure: float) -> ServoParameters:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -52,16 +52,14 @@ def read(settings: SensorSettings, index: int, truth: Readings) -> Readings:
     """
     normal, uniform = _random(settings.seed, index // _BLOCK)
     n, drops = normal[index % _BLOCK], uniform[index % _BLOCK]
-    lost = [drop < settings.drop_out for drop in drops]
-    pressure, velocity, force_sum, position = truth
+    kept: Any = [None if drop < settings.drop_out else value for drop, value in zip(drops, truth, strict=True)]
+    pressure, velocity, force_sum, position = kept
     reading = settings.reading
     return Readings(
-        None
-        if pressure is None or lost[0]
-        else (reading('pressure', pressure[0], n[0]), reading('pressure', pressure[1], n[1])),
-        None if velocity is None or lost[1] else reading('velocity', velocity, n[2]),
-        None if force_sum is None or lost[2] else reading('force', force_sum, n[3]),
-        None if position is None or lost[3] else reading('position', position, n[4]),
+        pressure and (reading('pressure', pressure[0], n[0]), reading('pressure', pressure[1], n[1])),
+        None if velocity is None else reading('velocity', velocity, n[2]),
+        None if force_sum is None else reading('force', force_sum, n[3]),
+        None if position is None else reading('position', position, n[4]),
     )
 
 

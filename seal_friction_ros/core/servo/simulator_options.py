@@ -43,9 +43,8 @@ FEEDFORWARD_MESSAGES = ('own', 'joint_state', 'array')
 class SimulatorSettings(CheckedParameters):
     """Settings of the simulation, one ROS parameter per field.
 
-    Raises:
-        ValueError: A value is out of bounds or unknown, ``time_factor`` needs ``publish_clock``, or standard messages
-            have no form of ``wave``.
+    ValueError: a value is out of bounds or unknown, ``time_factor`` needs ``publish_clock``, or standard messages have
+    no form of ``wave``.
     """
 
     wave: str = parameter(
@@ -109,17 +108,15 @@ class SimulatorSettings(CheckedParameters):
         if self.messages == 'standard' and self.wave not in WAVES:
             raise ValueError(f'SimulatorSettings.wave = {self.wave!r} needs messages: own')
         if self.time_factor != 1.0 and not self.publish_clock:
-            raise ValueError(
-                f'SimulatorSettings.time_factor = {self.time_factor} needs publish_clock, and use_sim_time elsewhere'
-            )
+            needed = 'needs publish_clock, and use_sim_time elsewhere'
+            raise ValueError(f'SimulatorSettings.time_factor = {self.time_factor} {needed}')
 
 
 @dataclass(frozen=True)
 class StandardMessages(CheckedParameters):
     """What a simulated axis with standard messages publishes.
 
-    Raises:
-        ValueError: The joint has no name, or ``reference`` is unknown.
+    ValueError: the joint has no name, or ``reference`` is unknown.
     """
 
     joint: str = parameter('rod', unit='', description='Name of the joint in every JointState.')
@@ -134,23 +131,16 @@ class StandardMessages(CheckedParameters):
         if not self.joint:
             raise ValueError('StandardMessages.joint is empty: give the joint a name')
         if self.reference not in REFERENCE_MESSAGES:
-            raise ValueError(
-                f'StandardMessages.reference = {self.reference!r} is none of {", ".join(REFERENCE_MESSAGES)}'
-            )
+            choices = ', '.join(REFERENCE_MESSAGES)
+            raise ValueError(f'StandardMessages.reference = {self.reference!r} is none of {choices}')
 
 
 def servo_parameters(
     settings: SimulatorSettings, parts: Mapping[type, Any], seals: tuple[MountedSeal, ...]
 ) -> ServoParameters:
-    """The simulated servo.
+    """The simulated servo, with a record for each type in `PLANT`; the valve of the other fluid is not used.
 
-    Args:
-        settings: Fluid, sample rate and inner step.
-        parts: A record for each type in `PLANT`; the valve of the other fluid is not used.
-        seals: Seals of the actuator.
-
-    Raises:
-        ValueError: The servo cannot work, see `ServoParameters`, or no seal file has the elasticity that is wanted.
+    ValueError: the servo cannot work, see `ServoParameters`, or no seal file has the elasticity that is wanted.
     """
     period = 1.0 / settings.rate
     return ServoParameters(

@@ -15,11 +15,8 @@ def tracking_rms(reference: FloatArray, position: FloatArray) -> float:
 def reversal_rms(reference: FloatArray, position: FloatArray) -> float:
     """Root mean square error near the reversals [m]: where the reference is in the outer tenths of its range.
 
-    Unlike the dwell it holds for a rod on elastic seals, which never rests. The tenths are our choice.
-
-    Args:
-        reference: Of a periodic motion [m], shape (n,).
-        position: [m], shape (n,).
+    Unlike the dwell it holds for a rod on elastic seals, which never rests. The tenths are our choice. Both are of
+    shape (n,) [m], the reference is that of a periodic motion.
     """
     middle, half = 0.5 * (reference.max() + reference.min()), 0.5 * np.ptp(reference)
     outer = np.abs(reference - middle) >= 0.8 * half
@@ -27,14 +24,7 @@ def reversal_rms(reference: FloatArray, position: FloatArray) -> float:
 
 
 def error_area(reference: FloatArray, position: FloatArray, period: float, turns: int) -> float:
-    """Integral of the magnitude of the error over time, per reversal [m s].
-
-    Args:
-        reference: [m], shape (n,).
-        position: [m], shape (n,).
-        period: Sample time [s].
-        turns: Reversals of the reference in these samples.
-    """
+    """Integral of the magnitude of the error over time, per reversal [m s]; both of shape (n,) [m], ``period`` [s]."""
     return float(np.abs(reference - position).sum()) * period / turns
 
 
@@ -47,12 +37,9 @@ def dwell_per_reversal(velocity: FloatArray, period: float, standstill: float = 
     """Mean rest per reversal of direction [s]; 0.0 without a reversal.
 
     A rest between motions in opposite directions is a reversal; so is a change of sign without a sample at rest, with a
-    dwell of zero. A rest between motions in one direction and a rest at either end of the record do not count.
-
-    Args:
-        velocity: Rod velocity [m/s], shape (n,).
-        period: Sample time [s].
-        standstill: Speed at and below which the rod rests [m/s]; 0.0 for a simulated rod, whose rest is exact.
+    dwell of zero. A rest between motions in one direction and a rest at either end of the record do not count. The
+    velocity is of shape (n,) [m/s], the ``period`` the sample time [s]. At and below the speed ``standstill`` [m/s] the
+    rod rests; 0.0 for a simulated rod, whose rest is exact.
     """
     direction = np.where(np.abs(velocity) > standstill, np.sign(velocity), 0.0)
     moving = np.flatnonzero(direction)

@@ -53,9 +53,8 @@ class OutputGain(NamedTuple):
 def output_gain(record: CommandRecord) -> OutputGain:
     """Gain from force to command, by robust regression.
 
-    Raises:
-        ValueError: There are too few samples, the command does not change, the gain cannot be told from the data, or it
-            is negative.
+    ValueError: there are too few samples, the command does not change, the gain cannot be told from the data, or it is
+    negative.
     """
     size = max(round(AVERAGE / float(np.median(np.diff(record.time)))), 1) if len(record.time) > 1 else 1
     has_position = bool(np.isfinite(record.position).all())
@@ -63,38 +62,29 @@ def output_gain(record: CommandRecord) -> OutputGain:
     signals = np.column_stack([record.command, *columns])
     signals = signals[np.isfinite(signals).all(axis=1)]
     if len(signals) < max(FEWEST_SAMPLES, 4 * size):
-        raise ValueError(
-            f'{len(signals)} usable samples of the command, the gain needs {FEWEST_SAMPLES}: {WHAT_TO_RECORD}'
-        )
+        few = f'{len(signals)} usable samples of the command, the gain needs {FEWEST_SAMPLES}'
+        raise ValueError(f'{few}: {WHAT_TO_RECORD}')
     kernel = np.ones(size) / size
     smooth = np.column_stack([np.convolve(signal, kernel, mode='valid') for signal in signals.T])
     command, inputs = smooth[:, 0], np.column_stack([smooth[:, 1:], np.ones(len(smooth))])
     if np.ptp(command) <= LEAST_COMMAND * max(float(np.abs(command).max()), 1e-300):
         raise ValueError(f'the command does not change: {WHAT_TO_RECORD}')
-    everything = np.ones(len(command), dtype=bool)
-    found = _robust_fit(inputs, command, everything)
+    found = _robust_fit(inputs, command, np.ones(len(command), dtype=bool))
     blocks = np.arange(len(command)) * BLOCKS // len(command)
     left_out = np.array([_robust_fit(inputs, command, blocks != block)[0] for block in range(BLOCKS)])
     error = float(np.sqrt((BLOCKS - 1) / BLOCKS * np.sum((left_out - left_out.mean()) ** 2)))
     gain = float(found[0])
+    said = f'the gain is {gain:.3g} per N'
     if not error <= LARGEST_ERROR * abs(gain):
-        raise ValueError(
-            f'the gain is {gain:.3g} per N with a standard error of {error:.2g}, more than {LARGEST_ERROR:.0%}: '
-            f'{WHAT_TO_RECORD}'
-        )
+        said = f'{said} with a standard error of {error:.2g}, more than {LARGEST_ERROR:.0%}'
+        raise ValueError(f'{said}: {WHAT_TO_RECORD}')
     if gain < 0.0:
-        raise ValueError(
-            f'the gain is {gain:.3g} per N: a larger command pushes less; check the sign of command and pressures'
-        )
+        raise ValueError(f'{said}: a larger command pushes less; check the sign of command and pressures')
     return OutputGain(gain, error, float(found[2]) if has_position else 0.0, float(found[1]), len(command))
 
 
 def _robust_fit(inputs: FloatArray, command: FloatArray, used: BoolArray) -> FloatArray:
-    """Coefficients with Huber's weights over the samples ``used``.
-
-    Raises:
-        ValueError: The inputs cannot be separated.
-    """
+    """Coefficients with Huber's weights over the samples ``used``; ValueError if the inputs cannot be separated."""
     matrix, wanted = inputs[used], command[used]
     spread = matrix.std(axis=0)
     spread[-1] = 1.0

@@ -20,13 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.estimation import feedforward
-from seal_friction_ros.core.estimation.feedforward import (
-    FADED_IN,
-    UNUSABLE,
-    FeedForwardSettings,
-    usable,
-    wanted_velocity,
-)
+from seal_friction_ros.core.estimation.feedforward import FADED_IN, UNUSABLE, FeedForwardSettings, wanted_velocity
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.messages.records import NO_ESTIMATE, Status
@@ -99,11 +93,9 @@ class RecordedTuning(TunedFeedForward[Residual]):
 
 
 def acceleration(time: FloatArray, velocity: FloatArray) -> FloatArray:
-    """Slope of the parabola through `ACCELERATION_WINDOW` samples [m/s^2]; NaN where the samples are uneven in time.
+    """Slope of the parabola through `ACCELERATION_WINDOW` samples [m/s^2]; NaN where they are uneven in time.
 
-    Args:
-        time: [s], shape (n,).
-        velocity: [m/s], shape (n,).
+    Time [s] and velocity [m/s] have the shape (n,), as the slope.
     """
     from scipy.signal import savgol_filter  # noqa: PLC0415  half a second, for bags only
 
@@ -125,14 +117,9 @@ def acceleration(time: FloatArray, velocity: FloatArray) -> FloatArray:
 
 
 def fit_law(recording: Recording, mass: float | None = None) -> RecordedLaw:
-    """Scale, mass and offset by least squares over the sliding samples.
+    """Scale, mass (unless it is known [kg]) and offset by least squares over the sliding samples.
 
-    Args:
-        recording: Motion of the axis.
-        mass: [kg] if known; None: fitted.
-
-    Raises:
-        ValueError: The rod slides too little, or with too little variety to separate the terms.
+    ValueError: the rod slides too little, or with too little variety to separate the terms.
     """
     velocity, state, status = recording.velocity, recording.state, recording.status
     slope = acceleration(recording.time, velocity)
@@ -142,9 +129,8 @@ def fit_law(recording: Recording, mass: float | None = None) -> RecordedLaw:
     sliding = (state == FrictionState.SLIDING) & usable & np.isfinite(slope) & np.isfinite(recording.force_sum)
     count = int(np.count_nonzero(sliding))
     if count < FEWEST_SLIDING:
-        raise ValueError(
-            f'the rod slides in {count} usable samples, the friction needs {FEWEST_SLIDING}: record a motion to and fro'
-        )
+        few = f'the rod slides in {count} usable samples, the friction needs {FEWEST_SLIDING}'
+        raise ValueError(f'{few}: record a motion to and fro')
     forward = np.count_nonzero(velocity[sliding] > 0.0) / count
     both = BOTH_DIRECTIONS <= forward <= 1.0 - BOTH_DIRECTIONS
     columns = [recording.coulomb_friction * np.sign(velocity), slope, np.ones(len(velocity))]
@@ -165,14 +151,9 @@ def fit_law(recording: Recording, mass: float | None = None) -> RecordedLaw:
 
 
 def near_reversals(time: FloatArray, reference_velocity: FloatArray) -> BoolArray:
-    """Samples near a reversal of the reference, see `NEAR_REVERSAL`.
+    """Samples near a reversal of the reference, see `NEAR_REVERSAL`, by time [s] and velocity [m/s]; all of shape (n,).
 
-    Args:
-        time: [s], shape (n,).
-        reference_velocity: [m/s], shape (n,).
-
-    Raises:
-        ValueError: The reference reverses less than twice.
+    ValueError: the reference reverses less than twice.
     """
     moving = np.flatnonzero(np.nan_to_num(reference_velocity))
     turned = np.flatnonzero(np.diff(np.sign(reference_velocity[moving])))
@@ -188,19 +169,17 @@ def near_reversals(time: FloatArray, reference_velocity: FloatArray) -> BoolArra
 def feedforward_force(settings: FeedForwardSettings, recording: Recording, friction_error: float = 0.0) -> FloatArray:
     """Feed-forward force along a recording [N], shape (n,), with a relative error of the friction model."""
     grounds = list(zip(recording.status.tolist(), recording.state.tolist(), strict=True))
-    is_usable = {one: usable(settings, NO_ESTIMATE._replace(status=one[0], state=one[1])) for one in set(grounds)}
+    estimates = {one: NO_ESTIMATE._replace(status=one[0], state=one[1]) for one in set(grounds)}
+    is_usable = {one: feedforward.usable(settings, estimate) for one, estimate in estimates.items()}
     columns = recording.stamps, recording.coulomb_friction, recording.velocity
     references = recording.reference_velocity, recording.reference_acceleration, recording.reference_age
     state, forces = FADED_IN, []
-    for ground, stamp, coulomb, measured, *reference in zip(
-        grounds, *(column.tolist() for column in (*columns, *references)), strict=True
-    ):
+    samples = zip(grounds, *(column.tolist() for column in (*columns, *references)), strict=True)
+    for ground, stamp, coulomb, velocity, *motion, age in samples:
         friction = (1.0 + friction_error) * coulomb if is_usable[ground] else -1.0
-        velocity = measured
         if not settings.use_measured_velocity:
-            *motion, age = reference
             late = abs(age) > settings.reference_timeout
-            velocity = math.nan if late else wanted_velocity(settings, *motion)
+            velocity = math.nan if late else wanted_velocity(settings, *motion)  # noqa: PLW2901  in its place
         state, out = feedforward.step(settings, state, stamp, stamp, friction, velocity)
         forces.append(out.force)
     return np.array(forces)
@@ -244,8 +223,7 @@ def tune_recorded_axis(
     identified['slew_limit'] = None if identified['smoothing_velocity'] is None else _slew(recording, settings)
     settings = _with_values(settings, identified)
 
-    cases = []
-    late = settings.lead_time
+    cases, late = [], settings.lead_time
     for friction in dict.fromkeys((-axis.friction_error, 0.0, axis.friction_error)):
         force = feedforward_force(settings, recording, friction)
         for lateness in dict.fromkeys((-axis.delay_error, 0.0, axis.delay_error)):
@@ -265,8 +243,8 @@ def largest_friction(recording: Recording, law: RecordedLaw) -> float:
 
 def _with_values(settings: FeedForwardSettings, values: dict[str, float | None]) -> FeedForwardSettings:
     """Settings with the identified values, clamped to their bounds."""
-    bounded_values: dict[str, Any] = {name: bounded(name, value) for name, value in values.items() if value is not None}
-    return replace(settings, **bounded_values)
+    known: dict[str, Any] = {name: bounded(name, value) for name, value in values.items() if value is not None}
+    return replace(settings, **known)
 
 
 def _smoothing(recording: Recording, law: RecordedLaw) -> float | None:

@@ -23,21 +23,12 @@ from typing import NamedTuple
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.parameters import meanings
-from seal_friction_ros.core.servo.closed_loop import (
-    Axis,
-    AxisRun,
-    EvaluationMotions,
-    Performance,
-    performance_of,
-    with_wrong_friction,
-    without_feedforward,
-)
+from seal_friction_ros.core.servo import closed_loop
+from seal_friction_ros.core.servo.closed_loop import Axis, AxisRun, EvaluationMotions, Performance, without_feedforward
 from seal_friction_ros.core.servo.motions import Sine
 from seal_friction_ros.core.tuning.settings import FORCE_MARGIN, RobustnessCase, TunedFeedForward, TuningSettings
 
-MOST_CANDIDATES = 100
-"""Number of settings after which the search ends, to bound its time."""
-
+MOST_CANDIDATES = 100  # settings after which the search ends, to bound its time
 SCALE_STEP = 0.01  # [-] step of scale
 LEAD_STEPS = 20  # steps of lead_time over the whole delay
 PREFERRED = (1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0)  # ISO 3, series R10
@@ -78,11 +69,7 @@ def nearest_preferred(value: float) -> int:
 
 @dataclass(frozen=True)
 class TuningProblem:
-    """A simulated axis, its task, and the errors of its sensors.
-
-    Raises:
-        ValueError: The servo cannot follow the reference.
-    """
+    """A simulated axis, its task, and the errors of its sensors; ValueError if the servo cannot follow its task."""
 
     axis: Axis
     settings: TuningSettings
@@ -98,10 +85,9 @@ class TuningProblem:
             ('acceleration', rate * speed, gains.controller.reference_acceleration_max, 'm/s2'),
         ):
             if value > most:
-                raise ValueError(
-                    f'amplitude = {s.amplitude} m at frequency = {s.frequency} Hz: {name} {value:.4g} {unit} is more '
-                    f'than the limit of the servo, {most:.4g} {unit}'
-                )
+                task = f'amplitude = {s.amplitude} m at frequency = {s.frequency} Hz'
+                limit = f'the limit of the servo, {most:.4g} {unit}'
+                raise ValueError(f'{task}: {name} {value:.4g} {unit} is more than {limit}')
 
     @property
     def whole_delay(self) -> float:
@@ -141,7 +127,7 @@ class TuningProblem:
         The delay error is relative to `whole_delay`. It changes the delay to the controller, which cannot be below 0.
         """
         runs = self.runs(feedforward, friction_error, delay_error, hold_time)
-        performance = performance_of(self.axis.servo.control_period, self.motions(hold_time), runs)
+        performance = closed_loop.performance_of(self.axis.servo.control_period, self.motions(hold_time), runs)
         return RobustnessCase(friction_error, delay_error, performance)
 
     def runs(
@@ -153,7 +139,7 @@ class TuningProblem:
     ) -> tuple[AxisRun, AxisRun, AxisRun]:
         """Sine, move and step of `case`."""
         delay = self.settings.delay + delay_error * self.whole_delay
-        wrong = with_wrong_friction(self.axis.pipeline._replace(feedforward=feedforward), friction_error)
+        wrong = closed_loop.with_wrong_friction(self.axis.pipeline._replace(feedforward=feedforward), friction_error)
         return self.motions(hold_time).runs(self.axis._replace(pipeline=wrong), max(delay, 0.0), self.noise)
 
     def without(self) -> Performance:
@@ -206,12 +192,7 @@ def merit(problem: TuningProblem, without: Performance, cases: Sequence[Robustne
 
 
 def tune(problem: TuningProblem, advance: Callable[[int], None] = lambda _: None) -> Tuning:
-    """Search for the feed-forward.
-
-    Args:
-        problem: Axis and task.
-        advance: Called with 1 for every candidate, at most `MOST_CANDIDATES` times.
-    """
+    """Search for the feed-forward; calls ``advance(1)`` for every candidate, at most `MOST_CANDIDATES` times."""
     without, friction = problem.without(), _largest_friction(problem)
     pipeline = problem.axis.pipeline
     limited = replace(pipeline.feedforward, force_limit=force_limit(friction))

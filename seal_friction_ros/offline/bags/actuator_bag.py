@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation.configuration import Recorded, snapshot_text
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.machine.machine import QUANTITIES, Machine, MachineActuator, MachineState
 from seal_friction_ros.core.machine.machine_snapshot import MachineSnapshot, machine_of, parse_machine_text
 from seal_friction_ros.core.messages import coder, layouts
 from seal_friction_ros.core.messages.blocks import Messages
-from seal_friction_ros.core.messages.layouts import MACHINE_TYPE
 from seal_friction_ros.core.messages.together import decode_together
 from seal_friction_ros.offline.bags.bag import (
     CONFIGURATION_TOPIC,
@@ -86,38 +86,23 @@ class Topics(NamedTuple):
         return f'{(self.configuration or CONFIGURATION_TOPIC).rpartition("/")[0]}/{STATE_NAME}'
 
 
-TYPES = Topics(
-    pressure=layouts.PRESSURE_TYPE,
-    velocity=layouts.VELOCITY_TYPE,
-    force=layouts.FORCE_TYPE,
-    reference=layouts.REFERENCE_TYPE,
-    position=layouts.POSITION_TYPE,
-    estimate=layouts.ESTIMATE_TYPE,
-    feedforward=layouts.FEEDFORWARD_TYPE,
-    configuration=layouts.CONFIGURATION_TYPE,
-    tick=layouts.TICK_TYPE,
-    temperature=layouts.TEMPERATURE_TYPE,
-    clock=layouts.CLOCK_TYPE,
-)
+TYPES = Topics(*(getattr(layouts, f'{name.upper()}_TYPE') for name in Topics._fields))
 """Message type of each topic."""
 
 
-def find_topics(bag: Path, namespace: str = '') -> Topics:
+def find_topics(bag: Path, namespace: str = '', infos: Mapping[str, TopicInfo] | None = None) -> Topics:
     """The estimator's topics in a bag, found by message type, so that names and remapping do not matter.
 
     Args:
         bag: The bag.
         namespace: Use only topics below it; for bags of several actuators.
+        infos: Topics of the bag, if they are known.
 
     Raises:
         BagError: There is no velocity topic, or a type of this project has several topics.
     """
-    return topics_among(bag_topics(bag), bag, namespace)
-
-
-def topics_among(infos: Mapping[str, TopicInfo], bag: Path, namespace: str = '') -> Topics:
-    """`find_topics` in a bag whose topics are known."""
-    result = Topics(*(find_topic(bag, wanted, namespace, infos) for wanted in TYPES))
+    known = bag_topics(bag) if infos is None else infos
+    result = Topics(*(find_topic(bag, wanted, namespace, known) for wanted in TYPES))
     if not result.velocity:
         raise BagError(
             f'{bag}: no message of {TYPES.velocity} in it, so nothing to estimate from: a bag of another machine needs '
@@ -127,11 +112,7 @@ def topics_among(infos: Mapping[str, TopicInfo], bag: Path, namespace: str = '')
 
 
 def find_topic(bag: Path, wanted: str, namespace: str, known: Mapping[str, TopicInfo]) -> str:
-    """The topic of a message type, see `find_topics`; empty if there is none.
-
-    Raises:
-        BagError: A type of this project has several topics.
-    """
+    """The topic of a message type, empty if there is none; raises as `find_topics`."""
     below = f'/{namespace.strip("/")}/'.replace('//', '/')
     found = [
         topic
@@ -173,27 +154,19 @@ class ActuatorBag(NamedTuple):
         return sum(info.message_count for info in self.infos.values())
 
     def messages(self, *, with_answers: bool = False) -> Iterator[BagMessage]:
-        """Messages in order of log time.
+        """Messages in order of log time; BagError where the bag is damaged.
 
         Args:
             with_answers: Whether to estimate, too, if the bag has a mapping file and so no estimates.
-
-        Raises:
-            BagError: The bag is damaged; raised when the damage is reached.
         """
         if not self.actuator:
             return read_messages(self.path)
         return _OfActuator(self).messages(machine_messages(self.path, self.mapping, with_answers=with_answers))
 
     def blocks(self, kind_of: KindOf) -> Iterator[Messages]:
-        """Messages in blocks; loads the compiler, which reads bags of this project many times faster.
+        """Messages in blocks, by the compiler, which reads bags of this project many times faster.
 
-        Args:
-            kind_of: Kind of the messages on a topic.
-
-        Raises:
-            UnsuitedError: As of `block_reader.read_in_bulk`.
-            BagError: The bag cannot be read.
+        Raises as `block_reader.read_in_bulk`, and UnsuitedError.
         """
         if self.actuator:
             return gathered(self.messages(), kind_of)
@@ -223,7 +196,7 @@ def open_actuator(bag: Path, namespace: str = '', mapping: MappingFile | None = 
     snapshot = recorded_machine(bag, infos) if mapping is None else None
     if snapshot is not None:
         return actuator_of(bag, infos, snapshot, namespace)
-    return ActuatorBag(bag, topics_among(infos, bag, namespace), infos)
+    return ActuatorBag(bag, find_topics(bag, namespace, infos), infos)
 
 
 def actuator_of(bag: Path, infos: Mapping[str, TopicInfo], snapshot: MachineSnapshot, namespace: str) -> ActuatorBag:
@@ -248,11 +221,7 @@ def _opened(
 
 
 def recorded_machine(bag: Path, infos: Mapping[str, TopicInfo]) -> MachineSnapshot | None:
-    """Machine whose ``machine_estimator`` recorded a bag; None: another bag.
-
-    Raises:
-        BagError: The bag, or its configuration, cannot be read.
-    """
+    """Machine whose ``machine_estimator`` recorded a bag; None: another bag. Raises BagError if it cannot be read."""
     present = {info.type_name for info in infos.values() if info.message_count}
     if layouts.CONFIGURATION_TYPE not in present:
         return None
@@ -266,11 +235,7 @@ def recorded_machine(bag: Path, infos: Mapping[str, TopicInfo]) -> MachineSnapsh
 
 
 def first_snapshot(bag: Path, messages: Iterable[BagMessage], topic: str = '') -> MachineSnapshot | None:
-    """Snapshot in the first configuration, on a topic if one is given; None without one.
-
-    Raises:
-        BagError: It cannot be read.
-    """
+    """Snapshot in the first configuration, on a topic if one is given; None without one; BagError if it is none."""
     found = (one for one in messages if one.type_name == layouts.CONFIGURATION_TYPE and topic in ('', one.topic))
     first = next(found, None)
     if first is None:
@@ -280,20 +245,12 @@ def first_snapshot(bag: Path, messages: Iterable[BagMessage], topic: str = '') -
 
 
 def _machine_of(bag: Path, snapshot: MachineSnapshot) -> tuple[Machine, MachineState]:
-    try:
+    with named_errors(bag, raised=BagError):
         return machine_of(snapshot, read_definitions(bag, snapshot.file.topics.values()))
-    except BagError:
-        raise
-    except ValueError as error:
-        raise BagError(f'{bag}: {error}') from None
 
 
 def _chosen(bag: Path, names: Sequence[str], namespace: str) -> str:
-    """Name of the actuator that a namespace means.
-
-    Raises:
-        BagError: It means none, or there are several and it is not given.
-    """
+    """Name of the actuator that a namespace means; BagError if it means none, or is not given and there are several."""
     wanted = namespace.strip('/').rpartition('/')[2]
     if not wanted and len(names) == 1:
         return names[0]
@@ -320,7 +277,7 @@ def _topics_of(actuator: MachineActuator, infos: Mapping[str, TopicInfo], *, has
     """Topics of an actuator, as its own messages have them."""
     present = {topic: info.type_name for topic, info in infos.items() if info.message_count}
     made = {name for name, needed in sources_of(actuator).items() if {*needed} <= present.keys()} | {'configuration'}
-    if has_mapping or MACHINE_TYPE in present.values():
+    if has_mapping or layouts.MACHINE_TYPE in present.values():
         made |= {'estimate', 'feedforward'}
     if not has_mapping:
         made |= {_OWN[kind] for topic, kind in present.items() if kind in _OWN and _is_of(actuator.name, topic)}
@@ -338,11 +295,7 @@ def _is_of(actuator: str, topic: str) -> bool:
 
 
 class _OfActuator:
-    """Messages of one actuator from those of its machine.
-
-    Args:
-        source: The actuator.
-    """
+    """Messages of one actuator from those of its machine."""
 
     def __init__(self, source: ActuatorBag) -> None:
         self._bag, self._name, self._topics = source.path, source.actuator, source.topics
@@ -354,11 +307,7 @@ class _OfActuator:
         self._has_velocity = False
 
     def messages(self, given: Iterable[BagMessage]) -> Iterator[BagMessage]:
-        """Messages of the actuator.
-
-        Raises:
-            BagError: A message does not match its type, or there is no velocity.
-        """
+        """Messages of the actuator. Raises BagError if a message does not match its type, or there is no velocity."""
         for message in given:
             with named(self._bag, message):
                 yield from self._taken(message)
@@ -374,7 +323,7 @@ class _OfActuator:
         if message.topic in translation.topics:
             made = [(record, frame_id) for _, record, frame_id in translation.records(message, self._missing)]
             return self._encoded(message, made)
-        if kind == MACHINE_TYPE:
+        if kind == layouts.MACHINE_TYPE:
             answers = decode_together(message.data)
             return self._encoded(
                 message, [(record, frame_id) for name, record, frame_id in answers if name == self._name]
@@ -448,5 +397,5 @@ def source_of(bag: Path | ActuatorBag, namespace: str) -> Source:
         path, infos, read, configuration = bag.path, bag.used, bag.messages, bag.topics.configuration
     first = first_snapshot(path, read(), configuration) if configuration else None
     is_own = first is None or first.file.document is None
-    own = topics_among(infos, path, namespace) if is_own else None
+    own = find_topics(path, namespace, infos) if is_own else None
     return Source(path, infos, read, configuration, first, own)

@@ -10,6 +10,7 @@ import os
 import re
 import shutil
 import sqlite3
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from datetime import UTC, datetime
@@ -22,6 +23,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 import yaml
 
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.messages.blocks import MOST_MESSAGES, Messages
 from seal_friction_ros.core.messages.cdr import ENCODING
 from seal_friction_ros.core.messages.coder import DECODERS
@@ -85,11 +87,7 @@ def timed_name(name: str) -> str:
 
 @cache
 def describe(type_name: str) -> Description:
-    """Description of a topic whose type is installed.
-
-    Raises:
-        BagError: It is not.
-    """
+    """Description of a topic whose type is installed; BagError if it is not."""
     try:
         definition, type_hash = message_definition(type_name)
     except ValueError as error:
@@ -161,7 +159,7 @@ class BagWriter:
         publish_time: int | None = None,
         description: Description | None = None,
     ) -> int:
-        """Append one serialised message.
+        """Append one serialised message; OSError if writing fails.
 
         Args:
             topic: Its topic.
@@ -173,9 +171,6 @@ class BagWriter:
 
         Returns:
             The recorded log time [ns]: the one given, or 1 ns after the last one if that is later.
-
-        Raises:
-            OSError: Writing failed.
         """
         key = (topic, type_name)
         if key not in self._descriptions:
@@ -189,11 +184,7 @@ class BagWriter:
         return log_time
 
     def flush(self) -> None:
-        """Pass all messages to the operating system, so that they outlive this process.
-
-        Raises:
-            OSError: Writing failed.
-        """
+        """Pass all messages to the operating system, so that they outlive this process; OSError if writing fails."""
         self._output.flush()
         if len(self._descriptions) > self._listed:
             self._write_metadata()
@@ -209,11 +200,7 @@ class BagWriter:
         return self._finished_size + self._output.size
 
     def close(self, custom_data: Mapping[str, str] | None = None) -> None:
-        """Write pending messages, the index and the final ``metadata.yaml``, which also holds ``custom_data``.
-
-        Raises:
-            OSError: Writing failed.
-        """
+        """Write pending messages, index and final ``metadata.yaml``, with ``custom_data``; OSError if writing fails."""
         self._custom_data |= custom_data or {}
         self._output.finish(_yaml_text(self._information()))
         self._write_metadata()
@@ -222,12 +209,8 @@ class BagWriter:
     def rescue(self, failure: str, offered: int) -> None:
         """After a failure, leave a valid bag of all complete chunks; on a full disk, drop chunks to make room.
 
-        Args:
-            failure: Reason of the failure; recorded in ``metadata.yaml``.
-            offered: Number of messages that were to be recorded; ``metadata.yaml`` counts those not in the bag.
-
-        Raises:
-            OSError: The bag could not be completed: use ``seal_friction recover``.
+        ``metadata.yaml`` tells the ``failure``, and how many of the ``offered`` messages are not in the bag. Raises
+        OSError if the bag could not be completed: use ``seal_friction recover``.
         """
         try:
             while True:
@@ -293,10 +276,9 @@ class BagWriter:
     def _information(self) -> dict[str, Any]:
         files = [file for file in self._files() if file[1].messages] or self._files()[:1]
         spans = [contents for _, contents in files]
-        counts: dict[tuple[str, str], int] = {}
-        for _, contents in files:
-            for key, count in contents.counts.items():
-                counts[key] = counts.get(key, 0) + count
+        counts: Counter[tuple[str, str]] = Counter()
+        for contents in spans:
+            counts.update(contents.counts)
         return {
             'version': 9,
             'storage_identifier': 'mcap',
@@ -347,9 +329,7 @@ def _topic_metadata(topic: str, description: Description) -> dict[str, Any]:
     }
 
 
-@cache
-def _parsed(text: str) -> Any:
-    return parse_yaml(text.encode(), 'QoS')
+_parsed = cache(lambda text: parse_yaml(text.encode(), 'QoS'))
 
 
 class _PlainDumper(yaml.SafeDumper):
@@ -380,10 +360,7 @@ def _qos(type_name: str) -> dict[str, Any]:
 
 
 def read_messages(path: Path) -> Iterator[BagMessage]:
-    """Messages of a bag, file by file, each in order of log time.
-
-    Args:
-        path: Bag folder, or a bare MCAP or SQLite file.
+    """Messages of a bag folder, or of a bare MCAP or SQLite file; file by file, each in order of log time.
 
     Raises:
         BagError: There is no bag, or it is damaged; raised when the damage is reached.
@@ -391,10 +368,8 @@ def read_messages(path: Path) -> Iterator[BagMessage]:
     with _as_bag_errors(path):
         found = storage(path)
         for message in found.read('file_messages'):
-            if found.packed == 'message':
-                yield message._replace(data=mcap_reader.unpack_zstd(message.data))
-            else:
-                yield message
+            is_packed = found.packed == 'message'
+            yield message._replace(data=mcap_reader.unpack_zstd(message.data)) if is_packed else message
 
 
 KindOf = Callable[[str, str], int]
@@ -448,19 +423,14 @@ class TopicInfo(NamedTuple):
 def bag_channels(path: Path) -> Iterator[tuple[Channel, int]]:
     """Channels of a bag and their numbers of messages, from its index if it has one; one may come often.
 
-    Raises:
-        BagError: There is no bag, or it is damaged.
+    Raises BagError if there is no bag, or it is damaged; `bag_topics` likewise.
     """
     with _as_bag_errors(path):
         yield from storage(path).read('file_channels')
 
 
 def bag_topics(path: Path) -> dict[str, TopicInfo]:
-    """Topics of a bag with their type and number of messages, from its index if it has one.
-
-    Raises:
-        BagError: There is no bag, or it is damaged.
-    """
+    """Topics of a bag with their type and number of messages, from its index if it has one."""
     found: dict[str, TopicInfo] = {}
     for (topic, _, (type_name, *_)), count in bag_channels(path):
         before = found.get(topic, TopicInfo(type_name, 0))
@@ -471,13 +441,9 @@ def bag_topics(path: Path) -> dict[str, TopicInfo]:
 
 
 def read_definitions(path: Path, types: Iterable[str]) -> dict[str, Definition]:
-    """Definition of each type (``package/Name``), of the bag if it has one.
+    """Definition of each of some types (``package/Name``), of the bag if it has one.
 
     A bag holds them as MCAP schemas or in the table ``message_definitions`` of SQLite, which rosbag2 writes since Iron.
-
-    Args:
-        path: Bag folder, or a bare MCAP or SQLite file.
-        types: The types that are needed.
 
     Raises:
         BagError: The bag cannot be read, or a type is neither defined in it nor installed, nor one of ROS 2.
@@ -492,10 +458,8 @@ def read_definitions(path: Path, types: Iterable[str]) -> dict[str, Definition]:
             break
     found = {}
     for name in wanted:
-        try:
+        with named_errors(f'{path}: definition of {name}', raised=BagError):
             found[name] = parse_definition(name, texts.get(name) or known_definition(full_name(name)))
-        except ValueError as error:
-            raise BagError(f'{path}: definition of {name}: {error}') from None
     return found
 
 
@@ -512,11 +476,7 @@ def _as_bag_errors(path: Path) -> Iterator[None]:
 
 
 def storage(path: Path) -> Storage:
-    """Find the files of a bag.
-
-    Raises:
-        BagError: There are none, or they are outside the folder.
-    """
+    """Find the files of a bag. Raises BagError if there are none, or they are outside the folder."""
     with _as_bag_errors(path):
         if not path.is_dir():
             if not path.is_file():
@@ -537,18 +497,13 @@ def storage(path: Path) -> Storage:
             raise ValueError(f'metadata.yaml: storage_identifier = {kind!r} is neither mcap nor sqlite3')
         mode, form = (str(information.get(f'compression_{name}') or 'none').lower() for name in ('mode', 'format'))
         if mode not in ('none', 'message', 'file') or (mode != 'none' and form != 'zstd'):
-            raise ValueError(
-                f'metadata.yaml: compression_mode = {mode!r} by {form!r} is none of message or file by zstd'
-            )
+            known = 'is none of message or file by zstd'
+            raise ValueError(f'metadata.yaml: compression_mode = {mode!r} by {form!r} {known}')
         return Storage(tuple(_inside(path, name) for name in names), _READERS[kind], mode)
 
 
 def _inside(folder: Path, name: str) -> Path:
-    """File of a bag; early versions of rosbag2 name the folder before the file.
-
-    Raises:
-        ValueError: The name or a link leads out of the folder, or there is no such file.
-    """
+    """File of a bag; early versions of rosbag2 name its folder, too. ValueError unless it is in the folder."""
     parts = PurePosixPath(name).parts
     file = folder / parts[-1] if parts else folder
     if len(parts) > 2 or not {'/', '..'}.isdisjoint(parts) or file.resolve().parent != folder.resolve():

@@ -44,11 +44,8 @@ _SCHEMA, _CHANNEL, _MESSAGE = int(Opcode.SCHEMA), int(Opcode.CHANNEL), int(Opcod
 def read_in_bulk(path: Path, kind_of: KindOf, stretch: Stretch | None = None) -> Iterator[Messages]:
     """Messages of a bag, or of a part of it, in the order of `bag.read_messages`, at most `MOST_MESSAGES` at a time.
 
-    Of a part only the chunks with such messages are read.
-
-    Raises:
-        BagError: It cannot be read.
-        ValueError: Likewise (or another error in `mcap_reader.ERRORS`).
+    Of a part only the chunks with such messages are read. Raises BagError, or one of `mcap_reader.ERRORS`, if the bag
+    cannot be read.
     """
     files = storage(path)
     if not files.is_plain_mcap:
@@ -60,16 +57,12 @@ def read_in_bulk(path: Path, kind_of: KindOf, stretch: Stretch | None = None) ->
             continue
         with file_path.open('rb') as file:
             layout = _layout(file)
-            blocks = [block for block in layout.blocks if _may_hold(block, begin, end)]
+            # A block without messages, whose first time is after its last, has channels.
+            blocks = [b for b in layout.blocks if b.first > b.last or (b.first < end and b.last >= begin)]
             for messages in _of_blocks(file, blocks, Names(layout.channels), kind_of):
                 first, last = (int(place) for place in np.searchsorted(messages.received, (begin, end)))
                 for start in range(first, last, MOST_MESSAGES):
                     yield messages.taken(start, min(start + MOST_MESSAGES, last))
-
-
-def _may_hold(block: Block, begin: int, end: int) -> bool:
-    """Whether there may be messages between two log times [ns] in a block; a block without messages has channels."""
-    return block.first > block.last or (block.first < end and block.last >= begin)
 
 
 def _of_blocks(file: BinaryIO, blocks: list[Block], names: Names, kind_of: KindOf) -> Iterator[Messages]:
@@ -83,11 +76,8 @@ def _of_blocks(file: BinaryIO, blocks: list[Block], names: Names, kind_of: KindO
 def times_of(path: Path, topic: str) -> list[tuple[int, int]]:
     """Number of the file and log time [ns] of each message of a topic, in order, without reading the messages.
 
-    Empty for a bag whose chunks have no index, and for one that `read_in_bulk` reads by the general reader.
-
-    Raises:
-        BagError: The bag cannot be read.
-        ValueError: A file is damaged or unfinished.
+    Empty for a bag whose chunks have no index, and for one that `read_in_bulk` reads by the general reader. Raises
+    BagError if the bag cannot be read, ValueError if a file is damaged or unfinished.
     """
     files = storage(path)
     times: list[tuple[int, int]] = []

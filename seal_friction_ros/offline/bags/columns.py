@@ -15,6 +15,7 @@ import numpy as np
 from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.foundation.compiled import has_compiler
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.messages.blocks import Messages, Numbers, UnsuitedError, numbers_of
 from seal_friction_ros.core.messages.coder import decode_text
 from seal_friction_ros.offline.bags.actuator_bag import TYPES, ActuatorBag
@@ -24,8 +25,6 @@ from seal_friction_ros.offline.work.progress import progress
 
 BULK_FROM = 300_000
 """Bags of at least so many messages are read in bulk: loading the compiler takes as long as reading them one by one."""
-
-
 _Decoded = TypeVar('_Decoded')
 
 
@@ -37,12 +36,7 @@ class Wanted(NamedTuple):
 
 
 class Block:
-    """Messages of a bag in a block, by name.
-
-    Args:
-        messages: All of them.
-        wanted: Name -> topic and type; the kind of a message is the place of its name, from 1 on.
-    """
+    """Messages of a bag in a block, by name; the kind of each is the place of its name in ``wanted``, from 1 on."""
 
     def __init__(self, messages: Messages, wanted: Mapping[str, Wanted]) -> None:
         self.messages = messages
@@ -50,26 +44,16 @@ class Block:
         self._wanted = wanted
 
     def of(self, name: str) -> Numbers:
-        """Numbers of the messages of a name.
-
-        Raises:
-            ValueError: One is malformed; names its topic and time.
-        """
+        """Numbers of the messages of a name; ValueError, with topic and time, if one is malformed."""
         topic, type_name = self._wanted[name]
         return numbers_of(self.messages, self._kinds[name], type_name, topic)
 
     def decoded(self, name: str, decode: Callable[[bytes], _Decoded]) -> Iterator[tuple[int, int, _Decoded]]:
-        """Place, log time [ns] and contents of each message of a name.
-
-        Raises:
-            ValueError: One is malformed; names its topic and time.
-        """
+        """Place, log time [ns] and contents of each message of a name; raises as `of`."""
         for place in np.flatnonzero(self.messages.kinds == self._kinds[name]).tolist():
             time = int(self.messages.received[place])
-            try:
+            with named_errors(f'message on {self._wanted[name].topic} at {time} ns'):
                 contents = decode(self.messages.message(place))
-            except ValueError as error:
-                raise ValueError(f'message on {self._wanted[name].topic} at {time} ns: {error}') from None
             yield place, time, contents
 
 
@@ -124,20 +108,12 @@ def collected(
     if messages is None and not bag.actuator and bag.total >= bulk_from and has_compiler():
         with suppress(UnsuitedError, OSError, *ERRORS):  # the general reader reads it, or says what is wrong
             return fill(bag.blocks(kind_of))
-    try:
+    with named_errors(bag.path, UnsuitedError, BagError), named_errors(bag.path, raised=BagError):
         return fill(gathered(bag.messages() if messages is None else messages, kind_of))
-    except BagError:
-        raise
-    except (UnsuitedError, ValueError) as error:
-        raise BagError(f'{bag.path}: {error}') from None
 
 
 class Held:
-    """The newest numbers of some inputs, across blocks.
-
-    Args:
-        counts: Name of each input -> how many of its numbers, from the first on.
-    """
+    """The newest numbers of some inputs, across blocks; of each as many as ``counts`` tells, from the first on."""
 
     def __init__(self, counts: Mapping[str, int]) -> None:
         self._newest = {name: np.full((count, 1), math.nan) for name, count in counts.items()}
@@ -175,11 +151,7 @@ def wanted_of(bag: ActuatorBag, names: Iterable[str]) -> dict[str, Wanted]:
 
 
 def read_velocity_rows(bag: ActuatorBag, *, bulk_from: int = BULK_FROM) -> VelocityRows:
-    """Each velocity sample with what came newest of the other inputs before it.
-
-    Raises:
-        BagError: As of `collected`.
-    """
+    """Each velocity sample with what came newest of the other inputs before it; raises as `collected`."""
     wanted = wanted_of(bag, (*INPUTS, 'configuration'))
     return collected(bag, wanted, _VelocityCollector, bulk_from=bulk_from).rows()
 
@@ -221,9 +193,7 @@ def extend(columns: list['array[float]'], rows: FloatArray) -> None:
 
 
 def in_turn(stamps: IntArray, places: IntArray, is_answer: BoolArray) -> tuple[IntArray, IntArray, IntArray]:
-    """Pairs of samples and answers of one stamp.
-
-    An answer belongs to the newest sample of its stamp, unless another answer is between them.
+    """Pairs of samples and answers of one stamp: each answer, if no other is between, with the newest sample.
 
     Args:
         stamps: Of samples and answers [ns], shape (n,).

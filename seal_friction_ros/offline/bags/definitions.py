@@ -1,12 +1,13 @@
 """Definitions of message types outside of bags: of an installed package, else those of ROS 2 in ``rosbags``."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from seal_friction_ros.core.messages.definitions import Definition, full_name, parse_definition
 from seal_friction_ros.core.messages.layouts import PACKAGE
 from seal_friction_ros.files import share_directory
 from seal_friction_ros.packages import needed
@@ -14,12 +15,9 @@ from seal_friction_ros.packages import needed
 
 @cache
 def message_definition(type_name: str) -> tuple[str, str]:
-    """Full text of the definition of an installed message type, and its RIHS01 hash.
+    """Full text of the definition of an installed message type, and its RIHS01 hash; ValueError if it is not installed.
 
     The text of a message of this project has its comments, with the units.
-
-    Raises:
-        ValueError: The type is not installed.
     """
     try:
         description = json.loads(_definition_file(type_name, '.json').read_text())
@@ -33,9 +31,8 @@ def message_definition(type_name: str) -> tuple[str, str]:
             package, _, stem = name.split('/')
             parts.append(f'MSG: {package}/{stem}\n{_definition_text(name)}')
     except (OSError, ValueError, LookupError) as error:
-        raise ValueError(
-            f'{type_name} is not installed: run make setup, or source the colcon workspace: {error}'
-        ) from None
+        hint = 'run make setup, or source the colcon workspace'
+        raise ValueError(f'{type_name} is not installed: {hint}: {error}') from None
     return ('=' * 80 + '\n').join(parts), hashes[type_name]
 
 
@@ -63,12 +60,13 @@ def _definition_file(type_name: str, suffix: str) -> Path:
     return share_directory(package, spec.origin) / 'msg' / f'{name}{suffix}'
 
 
-def known_definition(type_name: str) -> str:
-    """Definition of an installed type, or of one that is installed elsewhere: an older bag of SQLite has none.
+def installed_definitions(types: Iterable[str]) -> dict[str, Definition]:
+    """Definition of each of some installed types, ``package/Name``; raises as `message_definition`."""
+    return {kind: parse_definition(kind, message_definition(full_name(kind))[0]) for kind in types}
 
-    Raises:
-        ValueError: It is neither.
-    """
+
+def known_definition(type_name: str) -> str:
+    """Definition of an installed type, or of one of ROS 2, which old SQLite bags lack; ValueError if it is neither."""
     try:
         return message_definition(type_name)[0]
     except ValueError:

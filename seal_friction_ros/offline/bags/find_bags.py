@@ -13,15 +13,10 @@ _LONGEST_LIST = 100 << 20  # [bytes] our choice
 def find_bags(where: Path) -> list[Place]:
     """Bags below a folder, sorted by path, or in a text file, in its order; each once.
 
-    In a file every line is the path of a bag, relative to the folder of the file, or a URL; empty lines and
-    those that begin with ``#`` do not count. A path of a list need not exist: the computation on it says what is wrong.
+    In a file every line is the path of a bag, relative to the folder of the file, or a URL; empty lines and those that
+    begin with ``#`` do not count. A path of a list need not exist: the computation on it says what is wrong.
 
-    Args:
-        where: Folder or text file.
-
-    Raises:
-        ValueError: There is no bag, or the file is no list.
-        OSError: It cannot be read.
+    Raises ValueError if there is no bag, or the file is no list; OSError if it cannot be read.
     """
     found: list[Place] = [*sorted(_below(where))] if where.is_dir() else list(_listed(where))
     known: dict[str, Place] = {}

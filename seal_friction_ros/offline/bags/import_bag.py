@@ -6,7 +6,7 @@ The records are those that the live node makes of the same messages (`core.machi
 
 from array import array
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple
@@ -24,15 +24,13 @@ from seal_friction_ros.offline.bags.actuator_bag import no_velocity, sources_of
 from seal_friction_ros.offline.bags.bag import (
     CONFIGURATION_TOPIC,
     BagError,
-    BagMessage,
     BagWriter,
-    TopicInfo,
     bag_topics,
     named,
     read_messages,
 )
-from seal_friction_ros.offline.bags.mapped_bag import MappingFile, Translation, lacking, machine_in, read_mapping
-from seal_friction_ros.offline.work.progress import progress
+from seal_friction_ros.offline.bags.mapped_bag import MappingFile, Translation, lacking, machine_in
+from seal_friction_ros.offline.work.progress import counted, progress
 
 _TOPICS = {type_name: f'/{topic}' for topic, type_name in INPUTS.items()}
 
@@ -46,24 +44,14 @@ class ActuatorImport(NamedTuple):
     remarks: tuple[str, ...]  # what was missing or looks wrong
 
 
-def import_bag(bag: Path, mapping: str, out: Path, also: Collection[str] = ()) -> dict[str, ActuatorImport]:
+def convert_bag(bag: Path, out: Path, mapping: MappingFile, also: Collection[str] = ()) -> dict[str, ActuatorImport]:
     """Convert a bag with standard messages.
 
     Args:
         bag: Any rosbag2 bag, MCAP or SQLite.
-        mapping: Mapping file: a path, or the name of one in ``config/machines``.
         out: Bag to write; with several actuators a folder with one bag each, by their names. Must not exist.
+        mapping: Mapping file of the machine.
         also: Topics to copy as they are, for example the command of a controller.
-
-    Raises:
-        ValueError: The mapping does not fit the bag; one line that names file, actuator or topic. Nothing is written.
-        BagError: The bag cannot be read, or ``out`` exists or cannot be made.
-    """
-    return convert_bag(bag, out, read_mapping(mapping), also)
-
-
-def convert_bag(bag: Path, out: Path, mapping: MappingFile, also: Collection[str] = ()) -> dict[str, ActuatorImport]:
-    """`import_bag` with a mapping file that is read already.
 
     Raises:
         ValueError: The mapping does not fit the bag; one line that names file, actuator or topic. Nothing is written.
@@ -80,7 +68,8 @@ def convert_bag(bag: Path, out: Path, mapping: MappingFile, also: Collection[str
     try:
         with ExitStack() as stack:
             writers = [stack.enter_context(BagWriter(folder)) for folder in folders.values()]
-            counts, missing, lowest, tracks = _write(machine, state, bag, writers, topics, also)
+            present = {topic: info.message_count for topic, info in topics.items() if info.message_count}
+            counts, missing, lowest, tracks = _write(machine, state, bag, writers, present, also)
             for one, count in zip(machine.actuators, counts, strict=True):
                 if not count['/rod_velocity']:
                     raise ValueError(no_velocity(bag, one.name, missing))
@@ -91,11 +80,8 @@ def convert_bag(bag: Path, out: Path, mapping: MappingFile, also: Collection[str
     absent = [f'{topic} is not in the bag' for topic in machine.plans if topic not in topics]
     found = {}
     for one, count, low, track in zip(machine.actuators, counts, lowest, tracks, strict=True):
-        remarks = (
-            *absent,
-            *missing,
-            *(f'{one.name}: {text}' for text in pressure_remarks(mapping.file, one.mapping, low)),
-        )
+        pressures = (f'{one.name}: {text}' for text in pressure_remarks(mapping.file, one.mapping, low))
+        remarks = (*absent, *missing, *pressures)
         found[one.name] = ActuatorImport(folders[one.name], dict(count), track.rms, remarks)
     return found
 
@@ -130,7 +116,7 @@ def _write(
     state: MachineState,
     bag: Path,
     writers: list[BagWriter],
-    topics: Mapping[str, TopicInfo],
+    present: Mapping[str, int],
     also: Collection[str],
 ) -> tuple[list[Counter[str]], list[str], list[Lowest], list[_Track]]:
     """Write what each actuator gets, its velocity from the first pressure and force sum on.
@@ -142,19 +128,18 @@ def _write(
     """
     lowest = [Lowest() for _ in machine.actuators]
     tracks = [_Track() for _ in machine.actuators]
-    present = {topic for topic, info in topics.items() if info.message_count}
     awaited = [_awaited(one, present) for one in machine.actuators]
     counts: list[Counter[str]] = [Counter() for _ in machine.actuators]
     missing: Counter[str] = Counter()
     repairs: dict[tuple[int, str], StampRepair] = {}
     translation = Translation(machine, state)
-    with progress(f'import {bag.name}', sum(info.message_count for info in topics.values())) as advance:
-        for message in _messages_of(machine, bag, also, advance):
+    with progress(f'import {bag.name}', sum(present.values())) as advance:
+        used = {*machine.plans, *also}
+        for message in (one for one in counted(read_messages(bag), advance) if one.topic in used):
             if not writers[0].message_count:
                 _write_configurations(machine, state, writers, message.log_time)
-            if message.topic in also:
-                for writer in writers:
-                    writer.write(*message)
+            for writer in writers if message.topic in also else ():
+                writer.write(*message)
             if message.topic not in machine.plans:
                 continue
             with named(bag, message):
@@ -183,17 +168,6 @@ def _awaited(actuator: MachineActuator, present: Collection[str]) -> set[str]:
     sources = sources_of(actuator)
     kinds = {'pressure': PRESSURE_TYPE, 'force': FORCE_TYPE}
     return {kind for name, kind in kinds.items() if name in sources and {*sources[name]} <= {*present}}
-
-
-def _messages_of(
-    machine: Machine, bag: Path, also: Collection[str], advance: Callable[[int], object]
-) -> Iterator[BagMessage]:
-    """Messages that an actuator listens to, and those to copy."""
-    for number, message in enumerate(read_messages(bag), start=1):
-        if number % 1000 == 0:
-            advance(1000)
-        if message.topic in machine.plans or message.topic in also:
-            yield message
 
 
 def _write_configurations(machine: Machine, state: MachineState, writers: list[BagWriter], log_time: int) -> None:

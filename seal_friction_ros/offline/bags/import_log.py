@@ -4,8 +4,8 @@
 """
 
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import repeat
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,31 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.foundation.units import ZEROS, unit_size
 from seal_friction_ros.core.identification.signal_preparation import slope
 from seal_friction_ros.core.machine.gauge_or_absolute import HIGHEST_AMBIENT, LOWEST_ABSOLUTE
-from seal_friction_ros.core.messages.coder import encode
-from seal_friction_ros.core.messages.layouts import (
-    FORCE_TYPE,
-    POSITION_TYPE,
-    PRESSURE_TYPE,
-    REFERENCE_TYPE,
-    TEMPERATURE_TYPE,
-    VELOCITY_TYPE,
-)
+from seal_friction_ros.core.messages.coder import encode, type_of
 from seal_friction_ros.core.messages.records import Force, Position, Pressure, ServoReference, Temperature, Velocity
-from seal_friction_ros.offline.bags.bag import (
-    FORCE_TOPIC,
-    POSITION_TOPIC,
-    PRESSURE_TOPIC,
-    REFERENCE_TOPIC,
-    TEMPERATURE_TOPIC,
-    VELOCITY_TOPIC,
-    BagWriter,
-)
+from seal_friction_ros.offline.bags import bag
 from seal_friction_ros.offline.bags.log_table import Dropped, Expected, read_table
-from seal_friction_ros.offline.bags.rig_file import PARTS, REFERENCES, Combination, Rig, Term, read_rig
-from seal_friction_ros.offline.work.progress import progress
+from seal_friction_ros.offline.bags.rig_file import PARTS, REFERENCES, Combination, Rig, Term
+from seal_friction_ros.offline.work.progress import counted, progress
 
 _LAST_STAMP = (1 << 31) * 1_000_000_000  # [ns] first one beyond the int32 seconds of a ROS stamp
 _BLOCK = 10_000  # rows that are numbers of Python at a time
@@ -76,24 +61,13 @@ class Track(NamedTuple):
 NO_TRACK = Track()
 
 
-def import_log(log: Path, rig_file: Path, out: Path) -> ImportSummary:
+def convert_log(log: Path, out: Path, rig: Rig) -> ImportSummary:
     """Convert a measured log to a bag.
 
     Args:
         log: Text with one row per line, cells separated by commas, semicolons or white space; '#' begins a comment.
-        rig_file: Description of the columns.
         out: Bag to write; must not exist.
-
-    Raises:
-        ValueError: Rig file or log cannot be read or are invalid; one line that names file and field or line. Nothing
-            is written.
-        BagError: ``out`` exists already or cannot be made.
-    """
-    return convert_log(log, out, read_rig(rig_file))
-
-
-def convert_log(log: Path, out: Path, rig: Rig) -> ImportSummary:
-    """`import_log` with a rig that is read already.
+        rig: Description of the columns.
 
     Raises:
         ValueError: The log cannot be read or is invalid; one line that names file and line. Nothing is written.
@@ -118,11 +92,7 @@ class ReadLog(NamedTuple):
 
 
 def read_samples(log: Path, rig: Rig) -> ReadLog:
-    """Read a log.
-
-    Raises:
-        ValueError: The log cannot be read or is invalid; one line that names file and field or line.
-    """
+    """Read a log; ValueError, which names file and field or line, if it cannot be read or is invalid."""
     cells = _read_cells(log, rig)
     position = rig.known_position
     with np.errstate(invalid='ignore', over='ignore'):
@@ -148,11 +118,8 @@ def _pressure_remarks(rig: Rig, samples: Samples) -> Iterator[str]:
     is_vented = any(low <= LOWEST_ABSOLUTE for name, low in lows.items() if getattr(rig, name).terms)
     for name, low in lows.items():
         terms = getattr(rig, name).terms
-        named = [
-            term.column_name
-            for term in terms
-            if term.column_name.rstrip(')] ').lower().endswith(('abs', 'psia', 'bara'))
-        ]
+        columns = [term.column_name for term in terms]
+        named = [column for column in columns if column.rstrip(')] ').lower().endswith(('abs', 'psia', 'bara'))]
         if any(term.absolute for term in terms) or not terms:
             continue
         if named or (not is_vented and low <= HIGHEST_AMBIENT):
@@ -200,11 +167,9 @@ def _samples(log: Path, rig: Rig, cells: _Cells) -> Samples:
         signals = {part: _combined(getattr(rig, part), cells, rig) for part in PARTS[1:]}
     if rig.savitzky_golay is not None:
         seconds = (stamps - stamps[0]) * 1e-9
-        try:
+        with named_errors(log):
             signals['velocity'] = slope(seconds, signals['velocity'], rig.savitzky_golay)
-        except ValueError as error:
-            raise ValueError(f'{log}: {error}') from None
-    return Samples(stamps, signals['chamber_a'], signals['chamber_b'], signals['force_sum'], signals['velocity'])
+    return Samples(stamps, **signals)
 
 
 def _combined(combination: Combination, cells: _Cells, rig: Rig) -> FloatArray:
@@ -221,9 +186,8 @@ def _stamps(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Stamps [ns], start + time column, and the rows to keep: the most whose stamps increase.
 
-    Raises:
-        ValueError: More rows than `LARGEST_DROPPED` have a time that is not finite, outside the range of a stamp, or
-            not after the others.
+    ValueError: more rows than `LARGEST_DROPPED` have a time that is not finite, outside the range of a stamp, or not
+    after the others.
     """
     rows = len(line_numbers)
     if rig.time is None:
@@ -272,41 +236,23 @@ def longest_increasing(values: NDArray[np.int64]) -> NDArray[np.int64]:
 def write_samples(out: Path, samples: Samples, frame_id: str, track: Track = NO_TRACK) -> ImportSummary:
     """Write samples as a bag: temperature, pressure, force sum, position, reference, velocity, stamped as their row.
 
-    The velocity comes last, since it triggers the estimate.
-
-    Raises:
-        BagError: ``out`` exists already or cannot be made.
+    The velocity comes last, since it triggers the estimate. BagError if ``out`` exists already or cannot be made.
     """
-    frame, rows = frame_id.encode(), len(samples.stamp)
-    positions = repeat(None, rows) if track.position is None else _in_blocks(track.position)
-    celsius_of_rows = repeat(None, rows) if track.temperature is None else _in_blocks(track.temperature - ZEROS['degC'])
-    references: Iterator[Any] = repeat(None, rows)
-    if track.reference is not None:
-        references = zip(*map(_in_blocks, track.reference), strict=True)
-    with BagWriter(out) as writer, progress(f'import {out.name}', rows) as advance:
-        for count, (row, position, reference, celsius) in enumerate(
-            zip(zip(*map(_in_blocks, samples), strict=True), positions, references, celsius_of_rows, strict=True),
-            start=1,
-        ):
-            stamp, chamber_a, chamber_b, force_sum, velocity = row
-            if celsius is not None:
-                writer.write(TEMPERATURE_TOPIC, TEMPERATURE_TYPE, stamp, encode(Temperature(stamp, celsius), frame))
-            pressure = encode(Pressure(stamp, chamber_a, chamber_b), frame)
-            force = encode(Force(stamp, force_sum), frame)
-            writer.write(PRESSURE_TOPIC, PRESSURE_TYPE, stamp, pressure)
-            writer.write(FORCE_TOPIC, FORCE_TYPE, stamp, force)
-            if position is not None:
-                writer.write(POSITION_TOPIC, POSITION_TYPE, stamp, encode(Position(stamp, position), frame))
-            if reference is not None:
-                writer.write(
-                    REFERENCE_TOPIC,
-                    REFERENCE_TYPE,
-                    stamp,
-                    encode(ServoReference(stamp, reference[0], reference[1], reference[2], frame)),
-                )
-            writer.write(VELOCITY_TOPIC, VELOCITY_TYPE, stamp, encode(Velocity(stamp, velocity, frame)))
-            if count % 1000 == 0:
-                advance(1000)
+    celsius = None if track.temperature is None else (track.temperature - ZEROS['degC'],)
+    columns: dict[tuple[str, Callable[..., Any]], tuple[FloatArray, ...] | None] = {
+        (bag.TEMPERATURE_TOPIC, Temperature): celsius,
+        (bag.PRESSURE_TOPIC, Pressure): (samples.chamber_a, samples.chamber_b),
+        (bag.FORCE_TOPIC, Force): (samples.force_sum,),
+        (bag.POSITION_TOPIC, Position): None if track.position is None else (track.position,),
+        (bag.REFERENCE_TOPIC, partial(ServoReference, frame_id=frame_id.encode())): track.reference,
+        (bag.VELOCITY_TOPIC, partial(Velocity, frame_id=frame_id.encode())): (samples.velocity,),
+    }
+    given = [(*key, zip(*map(_in_blocks, parts), strict=True)) for key, parts in columns.items() if parts is not None]
+    with bag.BagWriter(out) as writer, progress(f'import {out.name}', len(samples.stamp)) as advance:
+        for stamp in counted(_in_blocks(samples.stamp), advance):
+            for topic, make, numbers in given:
+                record = make(stamp, *next(numbers))
+                writer.write(topic, type_of(record), stamp, encode(record, frame_id.encode()))
     finite = np.logical_and.reduce([np.isfinite(array) for array in samples[1:]])
     return ImportSummary(len(finite), int((~finite).sum()), int(samples.stamp[0]), int(samples.stamp[-1]))
 

@@ -8,20 +8,12 @@ from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.offline.bags.bag import BagError
 from seal_friction_ros.offline.work.executor import Workers
-from seal_friction_ros.offline.work.finished_parts import (
-    NOWHERE,
-    Kept,
-    Part,
-    Values,
-    content_of,
-    input_digests,
-    part_key,
-    try_parts,
-)
+from seal_friction_ros.offline.work.finished_parts import NOWHERE, Kept, Part, Values, keys_of, try_parts
 from seal_friction_ros.offline.work.outcome import Outcome
-from seal_friction_ros.offline.work.places import Place, as_path, name_of
+from seal_friction_ros.offline.work.places import Place, as_path, name_of, with_name
 
 Convert = Callable[[Path, Path], tuple[dict[str, Any], str]]
 """Picklable function of a source and of the bag to write; returns numbers and text for people."""
@@ -55,15 +47,10 @@ def import_many(
         raise BagError(f'{out} exists already: not overwriting')
     place = out.with_name(f'.{out.name}.{uuid4().hex}')  # a worker checks that it has this folder
     done = place / 'done'
-    try:
+    with named_errors(f'{out}: cannot make a bag there', OSError, BagError):
         done.mkdir(parents=True)
-    except OSError as error:
-        raise BagError(f'{out}: cannot make a bag there: {error.strerror}') from None
     try:
-        keys = list(map(str, range(len(sources))))
-        if kept.folder is not None:
-            digests = [one.result or one.error for one in input_digests(sources, workers)]
-            keys = [part_key('import', [*one, content_of(settings)]) for one in zip(digests, names, strict=True)]
+        keys = keys_of('import', sources, names, settings, workers, kept)
         folders = [(kept.folder or place) / f'{key}.bag' for key in keys]
         parts = [
             Part(key, ('numbers', 'text'), partial(_import, convert, source, folder / name), folder)
@@ -78,10 +65,8 @@ def import_many(
             (done if len(sources) > 1 else done / out.name).rename(out)
     finally:
         shutil.rmtree(place, ignore_errors=True)
-    return [
-        one._replace(error=one.error if str(source) in one.error else f'{source}: {one.error}') if one.error else one
-        for source, one in zip(sources, outcomes, strict=True)
-    ]
+    named = zip(sources, outcomes, strict=True)
+    return [one._replace(error=with_name(source, one.error)) if one.error else one for source, one in named]
 
 
 def _import(convert: Convert, source: Place, bag: Path) -> Values:
@@ -99,11 +84,7 @@ def _import(convert: Convert, source: Place, bag: Path) -> Values:
 
 
 def bag_names(sources: Sequence[Place]) -> list[str]:
-    """Name of the bag of each source, by `name_of`.
-
-    Raises:
-        ValueError: Two are the same.
-    """
+    """Name of the bag of each source, by `name_of`; ValueError if two are the same."""
     names = list(map(name_of, sources))
     for number, name in enumerate(names):
         if name in names[:number]:

@@ -54,14 +54,7 @@ def import_thesis(out: Path) -> ImportSummary:
     without force (0.2 s). Both chambers have the pressure of the test. While the rod slides evenly, the force sum is
     the friction: a spring scale pulls, and nothing accelerates.
 
-    Args:
-        out: Bag to write; must not exist.
-
-    Returns:
-        Summary of 9900 rows, 99 s.
-
-    Raises:
-        BagError: ``out`` exists already or cannot be made.
+    The bag has 9900 rows, 99 s. BagError if ``out`` exists already or cannot be made.
 
     Source: thesis, section 5.2 and Tables A-1 to A-3 (readings only). Speed and duration of each part are our choice:
     the test itself rests 30 s before each reading, 35 minutes in total.

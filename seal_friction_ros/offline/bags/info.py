@@ -36,10 +36,9 @@ class BagInfo:
         """The same for a person."""
         lines = [f'{self.bag}: {self.messages} messages in {self.duration_s:.3f} s']
         lines += [f'  {topic}: {t["count"]} x {t["type"]}, {t["rate_Hz"]} Hz' for topic, t in self.topics.items()]
-        counts = {'states': self.states, 'status': self.status}
-        texts = {'seals': self.seals} | {
-            title: [f'{name} {count}' for name, count in of_kind.items()] for title, of_kind in counts.items()
-        }
+        texts = {'seals': self.seals}
+        for title, counts in (('states', self.states), ('status', self.status)):
+            texts[title] = [f'{name} {count}' for name, count in counts.items()]
         lines += [
             f'  {topic}: {", ".join(f"{count} {what}" for what, count in found.items() if count)}'
             for topic, found in self.stamps.items()
@@ -50,13 +49,8 @@ class BagInfo:
 def bag_info(bag: Path, mapping: MappingFile | None = None) -> BagInfo:
     """Read a bag and summarise it.
 
-    Args:
-        bag: The bag.
-        mapping: Of its machine, if the bag does not hold it; then the estimates are made here.
-
-    Raises:
-        BagError: It cannot be read, or holds no message.
-        ValueError: The mapping does not fit the bag.
+    With the ``mapping`` of its machine, if the bag does not hold it, the estimates are made here. Raises BagError if
+    the bag cannot be read or holds no message, ValueError if the mapping does not fit it.
     """
     known = bag_topics(bag)
     times: list[int] = []
@@ -90,11 +84,7 @@ def bag_info(bag: Path, mapping: MappingFile | None = None) -> BagInfo:
 
 
 class _Stamps:
-    """Stamps that jump, and messages that are not of their type, by topic.
-
-    Args:
-        bag: The bag, which has the definitions of its types.
-    """
+    """Stamps that jump, and messages that are not of their type, by topic; the bag has the definitions of the types."""
 
     def __init__(self, bag: Path) -> None:
         self._bag = bag
@@ -113,12 +103,10 @@ class _Stamps:
         if reader is None:
             return
         try:
-            stamp = reader.read(message.data).stamp
+            if (stamp := reader.read(message.data).stamp) is not None:
+                self._repairs[topic].next(stamp, message.log_time)
         except ValueError:
             self._malformed[topic] += 1
-        else:
-            if stamp is not None:
-                self._repairs[topic].next(stamp, message.log_time)
 
     def found(self) -> dict[str, dict[str, int]]:
         """What was found, of the topics with something."""
@@ -134,11 +122,7 @@ class _Stamps:
 
 
 def _estimates(message: BagMessage) -> list[FrictionEstimate]:
-    """Estimates in a message.
-
-    Raises:
-        ValueError: The message does not match its type.
-    """
+    """Estimates in a message; ValueError if it does not match its type."""
     if message.type_name == ESTIMATE_TYPE:
         return [decode(ESTIMATE_TYPE, message.data)]
     if message.type_name != MACHINE_TYPE:
@@ -147,11 +131,7 @@ def _estimates(message: BagMessage) -> list[FrictionEstimate]:
 
 
 def _seals(text: str) -> list[str]:
-    """Each seal with its chamber in the text of a configuration, of a machine with the name of its actuator.
-
-    Raises:
-        ValueError: The text is no configuration.
-    """
+    """Each seal with its chamber in the text of a configuration, of a machine with the name of its actuator."""
     return [
         f'{name}: {seal} on chamber {chamber}'.removeprefix(': ')
         for name, one in parse_machine_text(text).configurations.items()

@@ -17,6 +17,7 @@ from typing import NamedTuple, TextIO
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.offline.bags.rig_file import SEPARATORS
 
 LARGEST_DROPPED = 0.02  # of the rows: with more the log is refused; our choice
@@ -60,14 +61,7 @@ class Dropped:
         self.first = self.first or text
 
     def check(self, rows: int) -> None:
-        """Check the share of rows that cannot be used.
-
-        Args:
-            rows: Number of all rows.
-
-        Raises:
-            ValueError: It is above `LARGEST_DROPPED`.
-        """
+        """Check the share of all rows that cannot be used; ValueError if it is above `LARGEST_DROPPED`."""
         count = self.counts.total()
         if count > LARGEST_DROPPED * rows:
             share = f'{count} of {rows} rows cannot be used, at most {LARGEST_DROPPED:.0%} may be left out'
@@ -99,28 +93,18 @@ def read_table(log: Path, columns: Sequence[tuple[str, int, str]], rig: Expected
 
 @contextmanager
 def _opened(log: Path) -> Iterator[Lines]:
-    """Lines of a log.
-
-    Raises:
-        ValueError: It cannot be read as text; names it.
-    """
+    """Lines of a log; ValueError, which names it, if it cannot be read as text."""
     if log.exists() and not (log.is_file() or log.is_dir()):  # a pipe or a device never ends
         raise ValueError(f'{log}: not a file')
     try:
-        with log.open(encoding='utf-8-sig') as file:
+        with named_errors(log, OSError), log.open(encoding='utf-8-sig') as file:
             yield _lines(file, log)
-    except OSError as error:
-        raise ValueError(f'{log}: {error.strerror}') from None
     except UnicodeDecodeError:
         raise ValueError(f'{log}: not a text file') from None
 
 
 def head_of(log: Path) -> list[tuple[int, str]]:
-    """Number and text of the first lines of a log, without empty ones.
-
-    Raises:
-        ValueError: It cannot be read as text; names it.
-    """
+    """Number and text of the first lines of a log, without empty ones; ValueError if it cannot be read as text."""
     with _opened(log) as lines:
         return list(islice(lines, _HEAD))
 
@@ -182,14 +166,10 @@ def _rows(lines: Iterable[tuple[int, str]], layout: Layout, rig: Expected) -> Li
 
 
 def find_layout(head: Sequence[tuple[int, str]], rig: Expected, names: Sequence[str] = ()) -> Layout:
-    """Header, separator and decimal mark of a table from its first lines.
+    """Header, separator and decimal mark of a table from its first lines; ``names`` are those of the wanted columns.
 
-    The separator is the one that makes most of the cells of the first row numbers, that of the header first.
-
-    Args:
-        head: The first lines.
-        rig: What the rig file says of the table.
-        names: Of the wanted columns: the header has all of them.
+    The separator is the one that makes most of the cells of the first row numbers, that of the header first. The header
+    has all of the ``names``.
     """
     plain = [place for place, (_, text) in enumerate(head) if not text.startswith('#')]
     first = next((place for place in plain if _best(head[place][1])[0] > 0.5), plain[0] if plain else len(head))
@@ -262,11 +242,7 @@ def share_of_numbers(cells: Sequence[str]) -> float:
 
 
 def _position(log: Path, column: tuple[str, int, str], header: list[str], width: int) -> int:
-    """Number of a column.
-
-    Raises:
-        ValueError: There is no such column, or several.
-    """
+    """Number of a column; ValueError if there is no such column, or several."""
     where, number, name = column
     if not name:
         if number >= width:
@@ -274,10 +250,8 @@ def _position(log: Path, column: tuple[str, int, str], header: list[str], width:
         return number
     found = [i for i, one in enumerate(header) if one == name]
     if len(found) != 1:
-        raise ValueError(
-            f'{log}: rig file names {where}.column_name = {name!r}, '
-            f'found {len(found)} times in the header: {", ".join(header)[:1000]}'
-        )
+        times = f'found {len(found)} times in the header: {", ".join(header)[:1000]}'
+        raise ValueError(f'{log}: rig file names {where}.column_name = {name!r}, {times}')
     return found[0]
 
 
@@ -285,10 +259,8 @@ def _numbers(cells: list[str], positions: Sequence[int], width: int, layout: Lay
     if len(cells) > width and not any(cells[width:]):  # a row that ends with a separator
         cells = cells[:width]
     if len(cells) != width:
-        raise ValueError(
-            f'{len(cells)} columns instead of {width}: separator {layout.separator or "space"!r}; '
-            'set header, separator or decimal in the rig file if that is wrong'
-        )
+        hint = 'set header, separator or decimal in the rig file if that is wrong'
+        raise ValueError(f'{len(cells)} columns instead of {width}: separator {layout.separator or "space"!r}; {hint}')
     numbers = []
     for position in positions:
         cell = cells[position].replace(',', '.') if layout.has_decimal_comma else cells[position]
@@ -296,8 +268,7 @@ def _numbers(cells: list[str], positions: Sequence[int], width: int, layout: Lay
             numbers.append(float(cell or 'nan'))
         except ValueError:
             name = f' ({layout.header[position]})' if layout.header else ''
-            raise ValueError(
-                f'column {position}{name} is {cells[position][:_SHOWN]!r}, not a number: '
-                'set header, skip_rows or decimal in the rig file'
-            ) from None
+            hint = 'set header, skip_rows or decimal in the rig file'
+            shown = repr(cells[position][:_SHOWN])
+            raise ValueError(f'column {position}{name} is {shown}, not a number: {hint}') from None
     return numbers

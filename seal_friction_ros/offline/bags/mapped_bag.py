@@ -20,20 +20,14 @@ from seal_friction_ros.core.machine.machine_file import MachineFile, parse_machi
 from seal_friction_ros.core.machine.machine_snapshot import machine_text, snapshot_of
 from seal_friction_ros.core.messages import coder, layouts, records
 from seal_friction_ros.core.messages.definitions import short_name
-from seal_friction_ros.core.messages.layouts import MACHINE_TYPE
 from seal_friction_ros.core.messages.records import Clock
 from seal_friction_ros.files import machine_configurations, read_machine
 from seal_friction_ros.offline.bags.bag import BagMessage, TopicInfo, bag_topics, named, read_definitions, read_messages
 
 MACHINE_CONFIGURATION = '/machine_estimator/configuration'
 LARGEST_CLOCK_STEP = 1_000_000_000  # [ns] stamps further from the log time are of another clock; our choice
-_LAST_PARTS = {
-    **layouts.INPUTS,
-    **layouts.OUTPUTS,
-    'watchdog_tick': layouts.TICK_TYPE,
-    'configuration': layouts.CONFIGURATION_TYPE,
-}
-LAST_PART = {kind: topic for topic, kind in _LAST_PARTS.items()}
+_OTHERS = {'watchdog_tick': layouts.TICK_TYPE, 'configuration': layouts.CONFIGURATION_TYPE}
+LAST_PART = {kind: topic for topic, kind in {**layouts.INPUTS, **layouts.OUTPUTS, **_OTHERS}.items()}
 """message type -> last part of its topic"""
 
 
@@ -54,8 +48,7 @@ class MappingFile(NamedTuple):
 def read_mapping(name: str) -> MappingFile:
     """Mapping file: a path, or the name of one in ``config/machines``.
 
-    Raises:
-        ValueError: It, or a seal file in it, cannot be read or is invalid; one line that names file and actuator.
+    ValueError, which names file and actuator: it, or a seal file in it, cannot be read or is invalid.
     """
     file = read_machine(name)
     return MappingFile(name, file, machine_configurations(file, name))
@@ -64,9 +57,8 @@ def read_mapping(name: str) -> MappingFile:
 def machine_in(bag: Path, mapping: MappingFile) -> tuple[Machine, MachineState]:
     """Machine of a mapping file with the definitions in a bag, and its state before the first message.
 
-    Raises:
-        ValueError: The mapping does not fit the bag; one line that names file, actuator or topic.
-        BagError: The bag cannot be read.
+    Raises BagError if the bag cannot be read, ValueError, which names file, actuator or topic, if the mapping does not
+    fit.
     """
     known = {topic: info.type_name for topic, info in bag_topics(bag).items()}
     for topic, kind in mapping.file.topics.items():
@@ -97,18 +89,10 @@ def _clock_offset(machine: Machine, bag: Path) -> int:
 
 
 def machine_messages(bag: Path, mapping: MappingFile | None, *, with_answers: bool = True) -> Iterator[BagMessage]:
-    """Messages of a bag; with a mapping file as ``machine_estimator`` would have recorded them.
+    """Messages of a bag; with a mapping file as ``machine_estimator`` would have recorded them, answers included.
 
-    What an estimator of this project may have recorded in it is left out then.
-
-    Args:
-        bag: The bag.
-        mapping: Of its machine; None: the bag as it is.
-        with_answers: Whether to estimate, too.
-
-    Raises:
-        ValueError: As of `machine_in`.
-        BagError: The bag cannot be read.
+    What an estimator of this project may have recorded in it is left out then. Without ``with_answers`` nothing is
+    estimated. Raises as `machine_in`.
     """
     if mapping is None:
         yield from read_messages(bag)
@@ -132,17 +116,15 @@ def machine_messages(bag: Path, mapping: MappingFile | None, *, with_answers: bo
                     state = receive(machine, state, plan, plan.read(message.data), message.log_time, collect)
                 yield from (BagMessage(topic, kind, message.log_time, data) for topic, kind, data in answers)
                 answers.clear()
-        elif message.type_name not in (*coder.DECODERS, MACHINE_TYPE):
+        elif message.type_name not in (*coder.DECODERS, layouts.MACHINE_TYPE):
             yield message
 
 
 class Translation:
     """Records of this project in the messages of a machine, as its estimator makes them.
 
-    Args:
-        machine: The machine.
-        state: Its state; only clocks and what the newest messages held count.
-        only: Actuator whose records are made; empty: all of them.
+    Of the state only clocks and what the newest messages held count. ``only`` names the actuator whose records are
+    made; empty: all.
     """
 
     def __init__(self, machine: Machine, state: MachineState, only: str = '') -> None:
@@ -160,12 +142,7 @@ class Translation:
     def records(self, message: BagMessage, missing: Counter[str]) -> Iterator[tuple[int, records.Input, bytes]]:
         """Number of the actuator, record and frame name of what a message makes, in the order of the estimator.
 
-        Args:
-            message: On one of the topics.
-            missing: Counts what messages lacked.
-
-        Raises:
-            ValueError: The message does not match its type.
+        ``missing`` counts what messages lacked.
         """
         plan, received = self._plans[message.topic], message.log_time
         if not plan.taken:

@@ -136,8 +136,7 @@ class Names:
     def learn(self, stream: BinaryIO, size: int) -> None:
         """Add the record of a schema or a channel that begins here and has so many bytes.
 
-        Raises:
-            ValueError: It is invalid, a name in it is too long or not printable, or its number is that of another one.
+        ValueError: it is invalid, a name in it is too long or not printable, or its number is that of another one.
         """
         record = _parsed(stream, size)
         if isinstance(record, records.Schema):
@@ -164,11 +163,7 @@ class Names:
 
 
 def _heads(file: BinaryIO) -> Iterator[tuple[int, int, int, bytes]]:
-    """Offset, opcode, size and first bytes of each record, up to the end of a finished file.
-
-    Raises:
-        ValueError: It is unfinished or not an MCAP file.
-    """
+    """Offset, opcode, size and first bytes of each record; ValueError if the file is unfinished or no MCAP."""
     file_size = os.fstat(file.fileno()).st_size
     file.seek(0)
     if file.read(len(MAGIC)) != MAGIC:
@@ -223,11 +218,7 @@ def _add_bare(blocks: list[Block], offset: int, size: int, time: int | None) -> 
 
 
 def scan_finished(file: BinaryIO) -> Layout:
-    """Walk over the records of a finished file.
-
-    Raises:
-        ValueError: It is damaged or unfinished; says what to do.
-    """
+    """Walk over the records of a finished file; ValueError, which says what to do, if it is damaged or unfinished."""
     layout = scan(file)
     if layout.damage:
         raise ValueError(f'{layout.damage}: use seal_friction recover')
@@ -266,15 +257,8 @@ Locate = Callable[[bytes, Block, Names], Integers]
 def located(data: bytes, block: Block, names: Names, on_wrong_time: Callable[[int], None] | None = None) -> Integers:
     """Rows of `Located` of the messages of a block. The channels described in it become known to ``names``.
 
-    Args:
-        data: Of the block.
-        block: Where it is, and between which log times.
-        names: The channels.
-        on_wrong_time: Called with each log time outside the block or beyond `LAST_TIME`, whose message is left out;
-            None: it is an error.
-
-    Raises:
-        ValueError: A record is invalid (or another error in `ERRORS`).
+    Raises one of `ERRORS` if a record is invalid. ``on_wrong_time`` is called with each log time outside the block or
+    beyond `LAST_TIME`, whose message is left out; without it, such a time is an error.
     """
     found = array('Q')
     first, last, size, offset = block.first, min(block.last, LAST_TIME), len(data), 0
@@ -306,17 +290,7 @@ OnFault = Callable[[Block, str], None]
 def messages(
     file: BinaryIO, layout: Layout, on_fault: OnFault | None = None, locate: Locate = located
 ) -> Iterator[tuple[Channel, int, int, bytes]]:
-    """Channel, log time [ns], publish time [ns] and bytes of each message, in the order of `in_order`.
-
-    Args:
-        file: The file.
-        layout: From `scan`.
-        on_fault: If None, an unreadable block is an error.
-        locate: As of `in_order`.
-
-    Raises:
-        ValueError: A block cannot be read, or too many overlap in time.
-    """
+    """Channel, log time [ns], publish time [ns] and bytes of each message; arguments and errors as of `in_order`."""
     names = Names(layout.channels)
     for data, rows in in_order(file, layout.blocks, names, locate, on_fault=on_fault):
         for channel, offset, size, time, sent in rows.view(np.uint64).T.tolist():
@@ -339,10 +313,10 @@ def in_order(
         names: Its channels.
         locate: Finds the messages of a block.
         at_once: Least size of the blocks that are read together [bytes].
-        on_fault: As of `messages`.
+        on_fault: Without it, an unreadable block is an error.
 
     Raises:
-        ValueError: As `messages`.
+        ValueError: A block cannot be read, or too many overlap in time.
     """
     if names.channels:  # else blocks stay in file order: channels are described before their messages
         blocks = sorted(blocks, key=lambda block: block.first)
@@ -395,27 +369,18 @@ def _joined(parts: Sequence[Located]) -> Located:
 
 
 def file_messages(path: Path) -> Iterator[BagMessage]:
-    """Messages of a finished file, in order of log time.
-
-    Raises:
-        ValueError: The file is not finished, or a block cannot be read.
-    """
+    """Messages of a file, in order of log time; ValueError if it is not finished, or a block cannot be read."""
     with path.open('rb') as file:
         for channel, log_time, publish_time, data in messages(file, scan_finished(file)):
             yield BagMessage(channel.topic, channel.description.type_name, log_time, data, publish_time)
 
 
 def file_channels(path: Path) -> Iterator[tuple[Channel, int]]:
-    """Channels of a finished file and their numbers of messages, from its index if it has one; one may come often.
-
-    Raises:
-        ValueError: As `file_messages`.
-    """
+    """Channels of a finished file and their numbers of messages, from its index if it has one; one may come often."""
     with path.open('rb') as file:
         layout = scan_finished(file)
-        counts = layout.counts
-        if layout.channels and counts is not None:
-            yield from ((channel, counts.get(number, 0)) for number, channel in layout.channels.items())
+        if layout.channels and layout.counts is not None:
+            yield from ((channel, layout.counts.get(number, 0)) for number, channel in layout.channels.items())
         else:
             yield from ((channel, 1) for channel, *_ in messages(file, layout))
 
@@ -444,24 +409,27 @@ def _unpacked(file: BinaryIO, block: Block) -> bytes:
 def unpack_zstd(data: bytes) -> bytes:
     """Unpack one zstd frame. The package allocates what the frame claims, so the claim is checked first.
 
-    Raises:
-        ValueError: It is no such frame, it claims or has more than `LARGEST_CHUNK`, or the package is not installed.
+    ValueError: it is no such frame, claims or has more than `LARGEST_CHUNK`, or the package is not installed.
     """
     zstandard = needed('zstandard')
-    try:
+    with _value_errors(zstandard.ZstdError):
         if (size := zstandard.frame_content_size(data)) > LARGEST_CHUNK:
             raise ValueError(_too_large(size))
         unpacker = zstandard.ZstdDecompressor(max_window_size=LARGEST_CHUNK)
         return cast(bytes, unpacker.decompress(data, max_output_size=LARGEST_CHUNK))
-    except zstandard.ZstdError as error:
-        raise ValueError(str(error)) from None
 
 
 def _unpack_lz4(data: bytes) -> bytes:
-    try:
+    with _value_errors(RuntimeError):
         unpacker = needed('lz4.frame').LZ4FrameDecompressor()
         return cast(bytes, unpacker.decompress(data, max_length=LARGEST_CHUNK + 1))
-    except RuntimeError as error:
+
+
+@contextmanager
+def _value_errors(kind: type[Exception]) -> Iterator[None]:
+    try:
+        yield
+    except kind as error:
         raise ValueError(str(error)) from None
 
 
@@ -472,19 +440,16 @@ _UNPACKERS: dict[str, Callable[[bytes], bytes]] = {'': bytes, 'zstd': unpack_zst
 def unpacked_file(path: Path) -> Iterator[Path]:
     """A zstd file unpacked to a temporary file (in the folder TMPDIR), which is removed at the end.
 
-    Raises:
-        ValueError: It is not a zstd file, its window is above `LARGEST_CHUNK`, zstandard is not installed, or unpacking
-            it would leave less than `FREE_SPACE` on the disk.
+    ValueError: it is not a zstd file, its window is above `LARGEST_CHUNK`, zstandard is not installed, or unpacking it
+    would leave less than `FREE_SPACE` on the disk.
     """
     zstandard = needed('zstandard')
     with path.open('rb') as packed, NamedTemporaryFile(prefix='seal_friction_', suffix=path.stem) as file:
-        try:
+        with _value_errors(zstandard.ZstdError):
             reader = zstandard.ZstdDecompressor(max_window_size=LARGEST_CHUNK).stream_reader(packed)
             while part := reader.read(_UNPACKED_AT_ONCE):
                 if shutil.disk_usage(file.name).free < FREE_SPACE + len(part):
                     raise ValueError(f'no room to unpack it in {Path(file.name).parent}: set TMPDIR to another folder')
                 file.write(part)
-        except zstandard.ZstdError as error:
-            raise ValueError(str(error)) from None
         file.flush()
         yield Path(file.name)

@@ -117,14 +117,7 @@ def _packed(record: McapRecord) -> bytes:
 
 
 class McapOutput:
-    """A file being written.
-
-    Args:
-        path: Its path; must not exist.
-
-    Raises:
-        OSError: It cannot be made. Every method raises it if writing fails.
-    """
+    """A file being written at a path that must not exist. Every method raises OSError if writing fails."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -156,15 +149,7 @@ class McapOutput:
     def write(
         self, key: tuple[str, str], description: Description, log_time: int, data: bytes, publish_time: int | None
     ) -> None:
-        """Append one message.
-
-        Args:
-            key: Its topic and type.
-            description: Of the topic.
-            log_time: [ns] after that of the last message.
-            data: Its bytes.
-            publish_time: [ns] on any clock; None: ``log_time``.
-        """
+        """Append one message of a topic and type; both times in [ns], ``publish_time`` None: ``log_time``."""
         channel = self._channels.get(key) or self._add_channel(key, description, log_time)
         self._chunk.add(channel, log_time, log_time if publish_time is None else publish_time, data)
         self.counts[key] += 1

@@ -7,7 +7,7 @@ import math
 import re
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.util import find_spec
@@ -66,11 +66,7 @@ class _Topic:
 
 
 def new_machine(bag: Path) -> str:
-    """Text of a mapping file for the machine in a bag.
-
-    Raises:
-        BagError: The bag cannot be read, or holds no joint and no pressure.
-    """
+    """Text of a mapping file for the machine in a bag; BagError if it cannot be read, or holds no joint."""
     everything = _look(bag)
     found = {topic: one for topic, one in everything.items() if one.kind in KNOWN}
     joints = {topic: one for topic, one in found.items() if one.kind == JOINT_STATE and one.names}
@@ -85,15 +81,10 @@ def new_machine(bag: Path) -> str:
         'topics:',
     ]
     lines += [f'  {topic}: {one.kind.replace("/", "/msg/")}{_said(one)}' for topic, one in sorted(found.items())]
-    lines += [
-        'ambient_pressure: 101325.0  # [Pa] guess: sea level',
-        'actuators:',
-    ]
+    lines += ['ambient_pressure: 101325.0  # [Pa] guess: sea level', 'actuators:']
     joints_of = {name: topic for topic, one in measured.items() for name in one.names}
-    moving = {name: topic for name, topic in joints_of.items() if measured[topic].moves(name)}
-    actuators = moving or joints_of
-    still = [name for name in joints_of if name not in actuators]
-    if still:
+    actuators = {name: topic for name, topic in joints_of.items() if measured[topic].moves(name)} or joints_of
+    if still := [name for name in joints_of if name not in actuators]:
         lines.append(f'  # left out, since they never move in the bag: {", ".join(still)}')
     for number, (name, topic) in enumerate(actuators.items()):
         lines += _actuator(name, number, list(actuators), topic, found)
@@ -120,12 +111,10 @@ def _candidates(found: dict[str, _Topic], lines: list[str]) -> list[str]:
 
 @contextmanager
 def recorded_topics(seconds: float, wait: float) -> Iterator[Path]:
-    """Bag with what the topics of the running machine show for ``seconds`` [s]; it is gone after the ``with`` block.
+    """Bag with what the topics of the machine show for ``seconds`` [s]; it is gone after the ``with`` block.
 
     Another process listens, so that this one needs no ROS. It waits ``wait`` [s] at most for the first message.
-
-    Raises:
-        BagError: ROS 2 is not installed, or no topic of a known type has a message.
+    BagError if ROS 2 is not installed, or no topic of a known type has a message.
     """
     if find_spec('rclpy') is None:
         raise BagError('--from-topics needs ROS 2: source your distribution, or run make setup; or use --from-bag')
@@ -202,19 +191,16 @@ def _actuator(name: str, number: int, names: list[str], topic: str, found: dict[
         '    # rod: 22 mm  # missing',
         '    inputs:',
     ]
-    has_velocity = f'velocity[{name}]' in one.low
-    if f'position[{name}]' in one.low:
-        lines.append(f'      position: {topic} position[{name}]')
-    if has_velocity:
-        lines.append(f'      velocity: {topic} velocity[{name}]')
+    motions = ('position', 'velocity')
+    lines += [f'      {q}: {topic} {q}[{name}]' for q in motions if f'{q}[{name}]' in one.low]
     reference = [(t, o) for t, o in found.items() if o.kind == JOINT_STATE and name in o.names and t != topic]
     for where, other in reference[:1]:
-        given = (quantity for quantity in ('position', 'velocity') if f'{quantity}[{name}]' in other.low)
+        given = (q for q in motions if f'{q}[{name}]' in other.low)
         lines += [f'      reference_{q}: {where} {q}[{name}]  # guess: by the topic' for q in given]
     if not reference:
         lines.append('      # reference_velocity: /topic field  # missing: needed by tune and by the feed-forward')
     lines += _pressures(name, number, names, found)
-    if not has_velocity:
+    if f'velocity[{name}]' not in one.low:
         step = one.step.get(f'position[{name}]', 1e-6)
         text = f'{{step: {step:.3g} m, rate: {max(one.rate, 1.0):.0f} Hz}}'
         lines.append(f'    velocity_from_position: {text}  # guess: smallest change; noise: 5e-4 m/s unless given')
@@ -235,15 +221,14 @@ def _pressures(name: str, number: int, names: list[str], found: dict[str, _Topic
         one, low, high = found[topic], found[topic].low.get(path, 0.0), found[topic].high.get(path, 0.0)
         values = f'{low:.4g} to {high:.4g}'
         if one.kind == FLUID_PRESSURE and not is_gauge:
-            lines.append(f'      {key}: {topic}  # {values} Pa: absolute')
+            text = f'{topic}  # {values} Pa: absolute'
         elif one.kind == FLUID_PRESSURE:
-            lines.append(
-                f'      {key}: {{topic: {topic}, absolute: false}}  # {values} Pa; guess: gauge, by the lowest'
-            )
+            text = f'{{topic: {topic}, absolute: false}}  # {values} Pa; guess: gauge, by the lowest'
         else:
             unit = 'bar' if high < LARGEST_IN_BAR else 'Pa'
             text = f"{{topic: {topic}, field: '{path}', unit: {unit}}}"
-            lines.append(f'      {key}: {text}  # {values}; guess: the unit, gauge and the order of the array')
+            text += f'  # {values}; guess: the unit, gauge and the order of the array'
+        lines.append(f'      {key}: {text}')
     return lines
 
 
@@ -251,7 +236,7 @@ def _pressure_sources(
     name: str, number: int, names: list[str], found: dict[str, _Topic]
 ) -> list[tuple[str, str] | None]:
     """Topic and field of the pressure of each chamber; None if nothing was found."""
-    fluid = _of_actuator(name, names, [t for t, one in sorted(found.items()) if one.kind == FLUID_PRESSURE])
+    fluid = _of_actuator(name, names, FLUID_PRESSURE, found)
     if fluid:
         sides: list[tuple[str, str] | None] = [None, None]
         for topic in fluid:
@@ -269,16 +254,16 @@ def _pressure_sources(
     return [None, None]
 
 
-def _of_actuator(name: str, names: list[str], topics: Iterable[str]) -> list[str]:
-    """Topics with the name of an actuator in theirs; of the only actuator all of them."""
-    topics = list(topics)
+def _of_actuator(name: str, names: list[str], kind: str, found: dict[str, _Topic]) -> list[str]:
+    """Topics of a kind with the name of an actuator in theirs; of the only actuator all of them."""
+    topics = [topic for topic, one in sorted(found.items()) if one.kind == kind]
     mine = [topic for topic in topics if name.lower() in topic.lower()]
     return mine or (topics if len(names) == 1 else [])
 
 
 def _load(name: str, names: list[str], found: dict[str, _Topic]) -> list[str]:
     """The force sum."""
-    cells = _of_actuator(name, names, [t for t, one in sorted(found.items()) if one.kind == WRENCH])
+    cells = _of_actuator(name, names, WRENCH, found)
     if not cells:
         return [
             '    # force_sum: {pressures: true}  # missing: bore, rod; add load_force, weight or load_over_position:',

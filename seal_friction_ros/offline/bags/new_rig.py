@@ -14,15 +14,8 @@ import numpy as np
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.units import QUANTITY_OF, unit_named, unit_size
 from seal_friction_ros.core.machine.gauge_or_absolute import HIGHEST_AMBIENT, LOWEST_ABSOLUTE
-from seal_friction_ros.offline.bags.log_table import (
-    Expected,
-    Layout,
-    find_layout,
-    head_of,
-    numbers_in,
-    share_of_numbers,
-    split,
-)
+from seal_friction_ros.offline.bags import log_table
+from seal_friction_ros.offline.bags.log_table import Expected, Layout, share_of_numbers, split
 from seal_friction_ros.offline.work.targets import mark
 
 _NAMES = {
@@ -72,19 +65,15 @@ class _Column(NamedTuple):
 
 
 def new_rig(log: Path) -> str:
-    """Text of a rig file for a log.
-
-    Raises:
-        ValueError: The log cannot be read, or its head has no rows of numbers.
-    """
-    head = head_of(log)
+    """Text of a rig file for a log; ValueError if the log cannot be read, or its head has no rows of numbers."""
+    head = log_table.head_of(log)
     rows = [text for _, text in head if not text.startswith('#')]
     first = next((number for number, text in enumerate(rows) if _is_row(text)), None)
     if first is None:
         raise ValueError(f'{log}: no row of numbers in its first {len(head)} lines')
     kind = 'row' if first else 'comment' if head[0][1].startswith('#') else 'none'
-    layout = find_layout(head, Expected(kind))
-    values = numbers_in(head, layout, kind)
+    layout = log_table.find_layout(head, Expected(kind))
+    values = log_table.numbers_in(head, layout, kind)
     units = _units_below(rows[:first], layout)
     columns = [_column(number, layout, units, column) for number, column in enumerate(values.T)]
     return '\n'.join(_lines(log, kind, columns, values)) + '\n'
@@ -102,9 +91,8 @@ def _units_below(above: Sequence[str], layout: Layout) -> list[str]:
 
 
 def _column(number: int, layout: Layout, units: Sequence[str], values: FloatArray) -> _Column:
-    name = (
-        layout.header[number] if number < len(layout.header) and layout.header.count(layout.header[number]) == 1 else ''
-    )
+    given = layout.header[number] if number < len(layout.header) else ''
+    name = given if layout.header.count(given) == 1 else ''
     finite = values[np.isfinite(values)]
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (np.nan, np.nan)
     unit = unit_named(name) or (units[number] if number < len(units) else '')
@@ -132,14 +120,10 @@ def _lines(log: Path, kind: str, columns: Sequence[_Column], values: FloatArray)
         *_force_sum(of('force')),
         *_velocity(of('velocity'), of('length'), _step(columns, of, values)),
     ]
-    warm = of('temperature')
-    lines += [f'temperature: {warm[0].term()}{warm[0].said}'] if warm else []
-    used = {one.number for q in ('time', 'pressure', 'force', 'velocity', 'length', 'temperature') for one in of(q)}
-    unused = [
-        f'{one.number} {one.name}'.strip() + f' ({one.low:.4g} to {one.high:.4g})'
-        for one in columns
-        if one.number not in used
-    ]
+    lines += [f'temperature: {one.term()}{one.said}' for one in of('temperature')[:1]]
+    used = {one.number for quantity in _NAMES for one in of(quantity)}
+    rest = [one for one in columns if one.number not in used]
+    unused = [f'{one.number} {one.name}'.strip() + f' ({one.low:.4g} to {one.high:.4g})' for one in rest]
     return lines + ([f'# columns that are not used: {", ".join(unused)}'] if unused else [])
 
 
@@ -187,17 +171,14 @@ def _chambers(pressures: Sequence[_Column]) -> list[str]:
     lines = []
     for name, found in zip(('chamber_a', 'chamber_b'), sides, strict=True):
         if found is None:
-            missing = (
-                '  # missing: no column of a pressure' if name == 'chamber_a' else '  # open to the air, or missing'
-            )
-            lines.append(f'{name}: {{constant: 0.0}}{missing}')
+            missing = 'missing: no column of a pressure' if name == 'chamber_a' else 'open to the air, or missing'
+            lines.append(f'{name}: {{constant: 0.0}}  # {missing}')
             continue
         is_named = re.search(r'(abs|psia|bara)\W*$', found.name, re.IGNORECASE) is not None
         is_absolute = is_named or (not is_vented and found.low * unit_size(found.unit) <= HIGHEST_AMBIENT)
         why = '' if is_named or not is_absolute else '; guess: absolute, by the lowest'
-        lines.append(
-            f'{name}: {{terms: [{found.term(**({"absolute": True} if is_absolute else {}))}]}}{found.said}{why}'
-        )
+        term = found.term(absolute=True) if is_absolute else found.term()
+        lines.append(f'{name}: {{terms: [{term}]}}{found.said}{why}')
     return lines
 
 
@@ -212,11 +193,8 @@ def _force_sum(forces: Sequence[_Column]) -> list[str]:
 
 def _velocity(velocities: Sequence[_Column], positions: Sequence[_Column], step: float) -> list[str]:
     if velocities:
-        more = [f'position: {{terms: [{positions[0].term()}]}}{positions[0].said}'] if positions else []
-        return [
-            f'velocity: {{terms: [{velocities[0].term()}]}}{velocities[0].said}; guess: positive on extension',
-            *more,
-        ]
+        line = f'velocity: {{terms: [{velocities[0].term()}]}}{velocities[0].said}; guess: positive on extension'
+        return [line, *(f'position: {{terms: [{one.term()}]}}{one.said}' for one in positions[:1])]
     if not positions:
         return ['velocity: {constant: 0.0}  # missing: no column of a velocity or a position']
     width = f'{{window: {_STEPS * step:.3g}, order: 2, largest_gap: {5.0 * step:.3g}}}'

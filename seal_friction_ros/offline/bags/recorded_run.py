@@ -23,16 +23,7 @@ from seal_friction_ros.core.messages.layouts import FEEDFORWARD_TYPE
 from seal_friction_ros.core.messages.records import FrictionEstimate, Status
 from seal_friction_ros.offline.bags.actuator_bag import RECORDED, ActuatorBag, open_actuator
 from seal_friction_ros.offline.bags.bag import BagError
-from seal_friction_ros.offline.bags.columns import (
-    Block,
-    Held,
-    Wanted,
-    collected,
-    extend,
-    growing,
-    in_turn,
-    wanted_of,
-)
+from seal_friction_ros.offline.bags.columns import Block, Held, Wanted, collected, extend, growing, in_turn, wanted_of
 from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 
 MAX_GAP = 0.5  # [s] samples further apart do not belong to one stretch of a recording (our choice)
@@ -87,14 +78,9 @@ class RecordedRun:
 
 
 def read_run(bag: Path, namespace: str = '', mapping: MappingFile | None = None) -> RecordedRun:
-    """Read a bag of inputs and estimates.
+    """Read a bag of inputs and estimates; arguments as of `open_actuator`, with a mapping the estimates are made here.
 
     The inputs of an estimate are those held when the velocity sample of the same stamp arrived.
-
-    Args:
-        bag: The bag.
-        namespace: As of `open_actuator`.
-        mapping: Likewise; then the estimates are made here.
 
     Raises:
         BagError: The bag cannot be read, or holds no estimates.
@@ -122,10 +108,8 @@ class RunCollector:
         self.stamps = array('q')
         self._columns = growing(len(_COLUMNS))  # an hour at 1 kHz is 0.6 GB
         self._held = Held(_INPUTS)
-        self._pending = (
-            np.zeros(0, np.int64),
-            np.zeros((sum(_INPUTS.values()), 0)),
-        )  # samples that wait for their estimate
+        # Samples that wait for their estimate.
+        self._pending = np.zeros(0, np.int64), np.zeros((sum(_INPUTS.values()), 0))
         self._frames: dict[bytes, None] = {}
         self._configurations: list[tuple[int, int, str]] = []
 

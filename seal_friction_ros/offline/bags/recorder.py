@@ -28,7 +28,7 @@ BAGS_KEPT = 10  # as many bags fit into ``keep_size`` (our choice)
 RESUME_PERIOD = 5.0  # [s] between two looks for room on the disk
 _RESUME_ROOM = 1 << 20  # [bytes] that have to be free in addition, and a tenth of ``free_space`` (our choice)
 _END_SIZE = 1 << 18  # [bytes] reserved for the last chunk, the end of the file and metadata.yaml
-_LOOK_SIZE, _LOOK_PERIOD = 1 << 16, 0.1  # [bytes] of messages, [s]: the more often of both; a look takes 4 us
+_LOOK_SIZE, LOOK_PERIOD = 1 << 16, 0.1  # [bytes] of messages, [s]: the more often of both; a look takes 4 us
 _INDEX_SHARE = 200  # a file is at least as many times larger than its index
 _IDLE_PERIOD = 0.05  # [s] between checks of the queue without `flush_if_idle`; more wake-ups slow the estimator
 _BACKLOG_PERIOD = 0.002  # [s] the same while there is a backlog
@@ -51,7 +51,7 @@ class _LowSpaceError(Exception):
 class Recorder:
     """Recording of one bag, or of several one after the other, from construction to `close`.
 
-    Without room for it, a recording begins stopped, see `error`.
+    Without room for it, a recording begins stopped, see `error`. Raises BagError if the bag cannot be made.
 
     Args:
         path: Folder of the first bag; must not exist.
@@ -61,9 +61,6 @@ class Recorder:
         free_space: Space that is left free on the disk [bytes]; 0: none.
         keep_size: Largest size of all bags of ``owner`` beside this one and of this one [bytes]; 0: no limit.
         owner: Name of the recorder in ``metadata.yaml``; empty: none.
-
-    Raises:
-        BagError: The bag cannot be made.
     """
 
     def __init__(
@@ -193,7 +190,7 @@ class Recorder:
         unlooked = _LOOK_SIZE  # [bytes] written since the last look at the disk
         while self._queue or not self._stop.is_set():
             now = time.monotonic()
-            if unlooked >= _LOOK_SIZE or now - looked >= _LOOK_PERIOD:
+            if unlooked >= _LOOK_SIZE or now - looked >= LOOK_PERIOD:
                 self._check_space()
                 unlooked, looked = 0, now
             for _ in range(min(len(self._queue), _BATCH)):

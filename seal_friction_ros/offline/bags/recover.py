@@ -86,8 +86,7 @@ def _files(bag: Path) -> list[Path]:
 
 def _parts(name: str) -> list[str | int]:
     """Texts and numbers in turn, text first, to sort ``bag_10.mcap`` after ``bag_9.mcap``."""
-    parts = re.split(r'([0-9]+)', name)
-    return [int(part) if place % 2 else part for place, part in enumerate(parts)]
+    return [int(part) if place % 2 else part for place, part in enumerate(re.split(r'([0-9]+)', name))]
 
 
 def _copy(path: Path, writer: BagWriter, found: Recovery) -> None:

@@ -15,10 +15,7 @@ def delete_oldest(folder: Path, owner: str, largest: int) -> None:
 
     A bag counts if its name ends like that of `timed_name`, its ``metadata.yaml`` says that ``owner`` finished it, and
     its folder contains nothing but that file and its MCAP files. Everything else stays: bags with another name,
-    unfinished bags, folders with another file in them, and links.
-
-    Raises:
-        OSError: ``folder`` cannot be read.
+    unfinished bags, folders with another file in them, and links. Raises OSError if ``folder`` cannot be read.
     """
     total = 0
     bags = [path for path in folder.iterdir() if START_IN_NAME.search(path.name) and _is_finished_by(path, owner)]

@@ -44,13 +44,10 @@ PARTS = ('time', 'chamber_a', 'chamber_b', 'force_sum', 'velocity')
 REFERENCES = ('reference_position', 'reference_velocity', 'reference_acceleration')
 """Optional columns of the wanted motion."""
 _QUANTITIES = {
-    'chamber_a': 'pressure',
-    'chamber_b': 'pressure',
-    'force_sum': 'force',
-    'velocity': 'velocity',
-    'position': 'length',
-    **dict(zip(REFERENCES, ('length', 'velocity', 'acceleration'), strict=True)),
-}
+    'chamber_a': 'pressure', 'chamber_b': 'pressure', 'force_sum': 'force', 'velocity': 'velocity',
+    'position': 'length', 'reference_position': 'length', 'reference_velocity': 'velocity',
+    'reference_acceleration': 'acceleration',
+}  # fmt: skip
 """Combination of columns -> its quantity; that of a velocity made from position is a length."""
 SEPARATORS = {'semicolon': ';', 'tab': '\t', 'comma': ',', 'space': None}
 """Name of a separator of cells -> as `str.split` takes it."""
@@ -81,10 +78,8 @@ class Term(CheckedParameters):
     def __post_init__(self) -> None:
         super().__post_init__()
         if (self.column < 0) == (not self.column_name):
-            raise ValueError(
-                f'Term.column = {self.column}, Term.column_name = {self.column_name!r}: '
-                'give one of them, the number (0 or more) or the name'
-            )
+            given = f'Term.column = {self.column}, Term.column_name = {self.column_name!r}'
+            raise ValueError(f'{given}: give one of them, the number (0 or more) or the name')
         for name in ('unit', 'gain_unit'):
             if getattr(self, name) not in QUANTITY_OF:
                 raise ValueError(f'Term.{name} = {getattr(self, name)!r} is not one of {", ".join(QUANTITY_OF)}')
@@ -104,11 +99,7 @@ class Term(CheckedParameters):
 
 @dataclass(frozen=True, kw_only=True)
 class Combination(CheckedParameters):
-    """Linear combination of columns: constant + sum of gain times column, in SI.
-
-    Raises:
-        ValueError: The constant is not finite.
-    """
+    """Linear combination of columns: constant + sum of gain times column, in SI; ValueError if it is not finite."""
 
     terms: tuple[Term, ...] = ()
     constant: float = parameter(0.0, unit='SI', description='Constant part.')
@@ -167,25 +158,18 @@ class Rig(CheckedParameters):
         for where, term in self.terms():
             quantity = wanted[where.split('.')[0]]
             if not term.is_a(quantity):
-                raise ValueError(
-                    f'{where}.unit = {term.unit!r} with gain_unit = {term.gain_unit!r} is not a {quantity}: '
-                    f'use one of {", ".join(QUANTITIES[quantity])}'
-                )
+                units = f'{where}.unit = {term.unit!r} with gain_unit = {term.gain_unit!r}'
+                raise ValueError(f'{units} is not a {quantity}: use one of {", ".join(QUANTITIES[quantity])}')
             if self.header == 'none' and term.column_name:
                 raise ValueError(f'{where}.column_name = {term.column_name!r} but header = none: the log has no names')
 
     def terms(self) -> Iterator[tuple[str, Term]]:
         """Every term with its place in the rig file."""
-        if self.time is not None:
-            yield 'time', self.time
-        for part in PARTS[1:]:
-            for number, term in enumerate(getattr(self, part).terms):
-                yield f'{part}.terms[{number}]', term
-        if self.temperature is not None:
-            yield 'temperature', self.temperature
-        for part in ('position', *REFERENCES):
-            combination = getattr(self, part)
-            for number, term in enumerate(() if combination is None else combination.terms):
+        for part in (*PARTS, 'temperature', 'position', *REFERENCES):
+            value = getattr(self, part)
+            if isinstance(value, Term):
+                yield part, value
+            for number, term in enumerate(value.terms if isinstance(value, Combination) else ()):
                 yield f'{part}.terms[{number}]', term
 
     @property
@@ -195,11 +179,7 @@ class Rig(CheckedParameters):
 
 
 def read_rig(path: Path) -> Rig:
-    """Rig from its file.
-
-    Raises:
-        ValueError: The file cannot be read, or a value in it is invalid; names file, field, value and bound.
-    """
+    """Rig from its file; ValueError, with file, field, value and bound, if it cannot be read or a value is invalid."""
     document = read_yaml(path)
     if not isinstance(document, Mapping):
         raise ValueError(f'{path}: a rig file is a mapping of names to values, not {type(document).__name__}')
@@ -215,19 +195,15 @@ def read_rig(path: Path) -> Rig:
     }
     if 'temperature' in document:
         parts['temperature'] = _term(document['temperature'], f'{path}: temperature')
+    rest = {key: value for key, value in document.items() if key not in ('time', 'sliding', *parts)}
     time, rate = _taken_out(document['time'], 'rate')
-    return from_mapping(
-        Rig,
-        {key: value for key, value in document.items() if key not in ('time', 'sliding', *parts)},
-        str(path),
-        rate=0.0 if rate is None else in_si(rate, 'Hz', f'{path}: time.rate'),
-        time=None if rate is not None and not time else _term(time, f'{path}: time'),
-        savitzky_golay=None
-        if filter_values is None
-        else from_mapping(SavitzkyGolay, filter_values, f'{path}: velocity.savitzky_golay'),
-        sliding=from_mapping(Sliding, document.get('sliding', {}), f'{path}: sliding'),
-        **parts,
-    )
+    parts['rate'] = 0.0 if rate is None else in_si(rate, 'Hz', f'{path}: time.rate')
+    parts['time'] = None if rate is not None and not time else _term(time, f'{path}: time')
+    parts['savitzky_golay'] = None
+    if filter_values is not None:
+        parts['savitzky_golay'] = from_mapping(SavitzkyGolay, filter_values, f'{path}: velocity.savitzky_golay')
+    parts['sliding'] = from_mapping(Sliding, document.get('sliding', {}), f'{path}: sliding')
+    return from_mapping(Rig, rest, str(path), **parts)
 
 
 def _taken_out(values: Any, key: str) -> tuple[Any, Any]:

@@ -25,9 +25,7 @@ _LONGEST_NAME = 1024  # characters of a topic or a type
 def file_channels(path: Path) -> list[tuple[Channel, int]]:
     """Channels and their numbers of messages. A file of Humble and before has no definitions.
 
-    Raises:
-        ValueError: The file is not such a database.
-        sqlite3.Error: It is damaged.
+    Raises ValueError if it is not such a database, sqlite3.Error if it is damaged; `file_messages` likewise.
     """
     with _opened(path) as database:
         counts = {number: int(count) for number, count in database.execute(_COUNTS)}
@@ -45,12 +43,7 @@ def file_channels(path: Path) -> list[tuple[Channel, int]]:
 
 
 def file_messages(path: Path) -> Iterator[BagMessage]:
-    """Messages in order of log time; no publish times.
-
-    Raises:
-        ValueError: The file is not such a database.
-        sqlite3.Error: It is damaged.
-    """
+    """Messages in order of log time; no publish times."""
     with _opened(path) as database:
         names = {number: (name, type_name) for number, name, type_name in _names(database)}
         for number, log_time, data in database.execute(_MESSAGES):

@@ -57,9 +57,9 @@ class Parser(argparse.ArgumentParser):
         return [option for action in self._actions for option in action.option_strings if option.startswith('--')]
 
     def _refuse(self, word: str) -> NoReturn:
-        if not word.startswith('-'):
-            self.error(f'{word} is one argument too many')
-        self.error(f'there is no option {word}: {meant(word, self._options())}')
+        is_option = word.startswith('-')
+        what = f'there is no option {word}: {meant(word, self._options())}'
+        self.error(what if is_option else f'{word} is one argument too many')
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         """Check a command, or a choice of an option."""
@@ -85,15 +85,10 @@ def add_command(
     *examples: str,
     needs: tuple[str, ...] = (),
 ) -> argparse.ArgumentParser:
-    """Add a command with the option ``--json``.
+    """Add a command with the option ``--json``; ``run`` runs it and returns the exit code.
 
-    Args:
-        commands: Subparsers that it belongs to.
-        name: Name of the command.
-        run: Runs it and returns the exit code.
-        description: One line for ``--help``.
-        examples: Command lines for ``--help``, without ``seal_friction``.
-        needs: Optional packages that it does not work without, though it could be imported.
+    The ``examples`` are command lines for ``--help``, without ``seal_friction``. The command does not work without the
+    optional packages that it ``needs``, though it could be imported.
     """
     parser: argparse.ArgumentParser = commands.add_parser(name, **_help(description, examples))
     parser.add_argument('--json', action='store_true', help='print the numbers as one JSON object on stdout')
@@ -159,9 +154,8 @@ def add_actuator(parser: Any) -> None:
 
 def add_namespace(parser: Any) -> None:
     """Add the option that restricts a bag to one actuator."""
-    parser.add_argument(
-        '--namespace', default='', help='use only topics below it; of a machine the name of an actuator'
-    )
+    text = 'use only topics below it; of a machine the name of an actuator'
+    parser.add_argument('--namespace', default='', help=text)
 
 
 def add_mapping(parser: Any) -> None:
@@ -175,11 +169,7 @@ def add_bags(parser: Any) -> None:
 
 
 def mapping_of(arguments: argparse.Namespace) -> 'MappingFile | None':
-    """Mapping file, if one is given.
-
-    Raises:
-        ValueError: It cannot be read or is invalid.
-    """
+    """Mapping file, if one is given; ValueError if it cannot be read or is invalid."""
     from seal_friction_ros.offline.bags.mapped_bag import read_mapping
 
     return read_mapping(arguments.mapping) if arguments.mapping else None
@@ -197,16 +187,14 @@ def add_workers(parser: argparse.ArgumentParser, what: str) -> None:
     group = parser.add_mutually_exclusive_group()
     group.add_argument('--workers', '--jobs', type=at_least(1), metavar='N', help=text)
     group.add_argument('--scheduler', metavar='ADDRESS', help='compute on the Dask cluster with this scheduler')
-    parser.add_argument(
-        '--scheduler-tls', type=Path, nargs=3, metavar=('CA', 'CERT', 'KEY'), help='its certificates, PEM files'
-    )
+    files = ('CA', 'CERT', 'KEY')
+    parser.add_argument('--scheduler-tls', type=Path, nargs=3, metavar=files, help='its certificates, PEM files')
 
 
 def workers_of(arguments: argparse.Namespace) -> 'Workers':
     """Who computes: the cluster or the number of processes as given, else as many processes as there are cores.
 
-    Raises:
-        ValueError: The address of the cluster is none.
+    Raises ValueError if the address of the cluster is none.
     """
     from seal_friction_ros.offline.work.cluster import Cluster
     from seal_friction_ros.offline.work.executor import available_cores
@@ -234,22 +222,14 @@ def add_uncertainty(parser: argparse.ArgumentParser) -> None:
 
 
 def check_only_for(arguments: argparse.Namespace, options: Iterable[str], what: str) -> None:
-    """Check that options are not given, since what they are for is not.
-
-    Raises:
-        ValueError: One is.
-    """
+    """Check that options are not given, since what they are for is not; ValueError if one is."""
     for name in options:
         if getattr(arguments, name) not in (None, False, ''):
             raise ValueError(f'--{name.replace("_", "-")} is only for {what}')
 
 
 def samples_of(arguments: argparse.Namespace) -> tuple[int, int] | None:
-    """Number of samples and seed; None without samples.
-
-    Raises:
-        ValueError: An option is for samples, and there are none.
-    """
+    """Number of samples and seed; None without samples, ValueError if there is an option for them then."""
     if arguments.uncertain is not None:
         return arguments.uncertain, arguments.seed or 0
     check_only_for(arguments, ['seed'], '--uncertain N')
@@ -257,11 +237,7 @@ def samples_of(arguments: argparse.Namespace) -> tuple[int, int] | None:
 
 
 def kept_in(arguments: argparse.Namespace) -> 'Kept':
-    """Where finished parts are kept, as given.
-
-    Raises:
-        ValueError: An option is for a folder that is not given.
-    """
+    """Where finished parts are kept, as given; ValueError if an option is for a folder that is not given."""
     from seal_friction_ros.offline.work.finished_parts import Kept
 
     if arguments.work is None:
@@ -278,11 +254,7 @@ def checked(arguments: argparse.Namespace) -> AbstractContextManager[None]:
 
 
 def check_packages(arguments: argparse.Namespace) -> None:
-    """Check before the work that the packages for it and for its page are installed.
-
-    Raises:
-        MissingPackageError: One is not.
-    """
+    """Check before the work that the packages for it and its page are installed; MissingPackageError if not."""
     values = vars(arguments)
     has_page = any(kind is PAGE and values[name] is not None for name, kind in arguments.targets.items())
     for package in (*arguments.needs, *(_OF_A_PAGE if has_page else ())):
@@ -310,18 +282,16 @@ def place(text: str) -> 'Place':
 
 def non_negative(text: str) -> float:
     """Type of an option: a finite number of at least 0."""
-    value = float(text)
-    if not 0.0 <= value < math.inf:
+    if not 0.0 <= float(text) < math.inf:
         raise argparse.ArgumentTypeError(f'{text} is not a finite number of at least 0')
-    return value
+    return float(text)
 
 
 def positive(text: str) -> float:
     """Type of an option: a finite number above 0."""
-    value = float(text)
-    if not 0.0 < value < math.inf:
+    if not 0.0 < float(text) < math.inf:
         raise argparse.ArgumentTypeError(f'{text} is not a finite number above 0')
-    return value
+    return float(text)
 
 
 def at_least(least: int) -> Callable[[str], int]:
@@ -329,10 +299,9 @@ def at_least(least: int) -> Callable[[str], int]:
 
     def whole_number(text: str) -> int:
         """Number that a text is."""
-        value = int(text)
-        if value < least:
+        if int(text) < least:
             raise argparse.ArgumentTypeError(f'{text} is below {least}')
-        return value
+        return int(text)
 
     return whole_number
 
@@ -345,18 +314,15 @@ def print_result(
 ) -> int:
     """Print the summary and what was written, or with ``--json`` the numbers and the rest on stderr; then the errors.
 
-    Returns:
-        The exit code.
+    Returns the exit code.
     """
     values = vars(arguments)
-    written = [text for name, kind in arguments.targets.items() if (text := written_text(values[name], kind))]
-    summary = '\n'.join([*([summary] if summary else []), *written]).encode(errors='backslashreplace').decode()
+    written = [written_text(values[name], kind) for name, kind in arguments.targets.items()]
+    summary = '\n'.join(filter(None, [summary, *written])).encode(errors='backslashreplace').decode()
     show_status('')
     if arguments.json:
         print(json.dumps(json_value(numbers), allow_nan=False))
-        print(summary, file=sys.stderr)
-    else:
-        print(summary)
+    print(summary, file=sys.stderr if arguments.json else sys.stdout)
     for error in errors:
         print_error(error)
     return code

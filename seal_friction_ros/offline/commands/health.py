@@ -11,20 +11,15 @@ from seal_friction_ros.offline.work.targets import SEAL_FILE, TABLE
 
 def add_parser(commands: Any) -> None:
     """Add the commands."""
-    health = cli.add_command(
-        commands, 'health', run_health, 'show how friction, offset and starts of the seals change over bags',
-        'health monday tuesday wednesday --out health.html',
-    )  # fmt: skip
-    fleet = cli.add_command(
-        commands, 'fleet', run_fleet,
-        'show which seal drifts, which rig disagrees, which recording is damaged, of many bags',
-        'fleet bags --out fleet.html',
-        'fleet bags.txt --out fleet.html --parquet fleet.parquet --work build/fleet --scheduler tcp://HOST:8786',
-    )  # fmt: skip
-    adapt = cli.add_command(
-        commands, 'adapt', run_adapt, 'learn the friction of today from bags and save it as a seal file',
-        'adapt today --seal my_seal.yaml --out my_seal_today.yaml',
-    )  # fmt: skip
+    description = 'show how friction, offset and starts of the seals change over bags'
+    example = 'health monday tuesday wednesday --out health.html'
+    health = cli.add_command(commands, 'health', run_health, description, example)
+    description = 'show which seal drifts, which rig disagrees, which recording is damaged, of many bags'
+    example = 'fleet bags.txt --out fleet.html --parquet fleet.parquet --work build/fleet --scheduler tcp://HOST:8786'
+    fleet = cli.add_command(commands, 'fleet', run_fleet, description, 'fleet bags --out fleet.html', example)
+    description = 'learn the friction of today from bags and save it as a seal file'
+    example = 'adapt today --seal my_seal.yaml --out my_seal_today.yaml'
+    adapt = cli.add_command(commands, 'adapt', run_adapt, description, example)
     cli.add_bags(health)
     help_text = 'folder with bags below it, or text file with the path or URL of a bag in each line'
     fleet.add_argument('where', type=Path, metavar='DIR|LIST', help=help_text)
@@ -71,12 +66,7 @@ def run_health(arguments: argparse.Namespace) -> int:
     summary = write_health_report(names, [one for one, _ in seen], arguments.out, limits)
     lines = []
     for day in summary.numbers['bags']:
-        lines.append(
-            f'{day["bag"]}: no reversal to learn from'
-            if not day['reversals']
-            else f'{day["bag"]}: scale {day["scale"]:.3f} +- {day["scale_std"]:.3f}, {_offset_text(day["offset"])}, '
-            f'{day["reversals"]} reversals'
-        )
+        lines.append(f'{day["bag"]}: {_learnt_text(day) if day["reversals"] else "no reversal to learn from"}')
         lines += [f'  alarm: {alarm}' for alarm in day['alarms']]
     lines += [
         f'change: from {change["scale_before"]:.3f} to {change["scale_then"]:.3f} at {change["time_s"]:.3f} s'
@@ -86,9 +76,10 @@ def run_health(arguments: argparse.Namespace) -> int:
     return cli.print_result(arguments, {**summary.numbers, 'errors': errors}, '\n'.join(lines), code, errors)
 
 
-def _offset_text(offset: float) -> str:
-    """Offset of the force sum [N]; without a force sum there is none."""
-    return f'offset {offset:.4g} N' if math.isfinite(offset) else 'offset not told'
+def _learnt_text(day: dict[str, Any]) -> str:
+    """What was learnt from a bag; without a force sum there is no offset."""
+    offset = f'offset {day["offset"]:.4g} N' if math.isfinite(day['offset']) else 'offset not told'
+    return f'scale {day["scale"]:.3f} +- {day["scale_std"]:.3f}, {offset}, {day["reversals"]} reversals'
 
 
 def run_fleet(arguments: argparse.Namespace) -> int:

@@ -21,10 +21,8 @@ def add_parser(commands: Any) -> None:
     parser.add_argument('sources', type=cli.place, nargs='+', metavar='SOURCE', help=text)
     cli.add_target(parser, '--out', SEAL_FILE, required=True, metavar='SEAL.yaml', help='seal file to write')
     cli.add_page(parser, '--report', required=False)
-    cli.add_target(
-        parser, '--next', DATA_SHEET, metavar='SHEET.csv',
-        help='data sheet of the pressures and speeds that would make the law certain; a page goes beside it',
-    )  # fmt: skip
+    text = 'data sheet of the pressures and speeds that would make the law certain; a page goes beside it'
+    cli.add_target(parser, '--next', DATA_SHEET, metavar='SHEET.csv', help=text)
     cli.add_file(parser, '--rig', 'rigs', 'rig file of the logs')
     cli.add_file(parser, '--seal', 'seals', 'seal file with the geometry of the ring')
     cli.add_options(parser, _WHAT_IS_KNOWN)
@@ -83,7 +81,6 @@ def _run_kinds(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.core.identification.several_kinds import LARGEST_KIND_ERROR, SealKind
     from seal_friction_ros.offline.identification import kinds
     from seal_friction_ros.offline.identification.data_sheet import write_new_csv
-    from seal_friction_ros.offline.identification.sources import SourceOptions
     from seal_friction_ros.offline.work.seal_writer import write_seal
     from seal_friction_ros.offline.work.targets import checked_targets
 
@@ -98,11 +95,10 @@ def _run_kinds(arguments: argparse.Namespace) -> int:
     targets = [(path, SEAL_FILE) for path in files.values()]
     paths = [one for one in arguments.sources if isinstance(one, Path)]
     with checked_targets('identify', targets, paths, force=arguments.force):
-        options = SourceOptions(**_of_sources(arguments))
         each = [SealKind(*kind) for kind in arguments.kinds]
-        name = arguments.name or arguments.out.stem
-        error = arguments.largest_kind_error
+        name, error = arguments.name or arguments.out.stem, arguments.largest_kind_error
         accepted = LARGEST_KIND_ERROR if error is None else error
+        options = _source_options(arguments)
         result = kinds.identify_kinds(arguments.sources, options, each, name, arguments.run_to_run, accepted)
         for kind, path in files.items():
             write_seal(result.documents[kind], path, f'Seal file, {mark("identify")}.')
@@ -120,11 +116,10 @@ def _run_kinds(arguments: argparse.Namespace) -> int:
     return cli.print_result(arguments, numbers, f'{kinds.kinds_summary(result)}\n{names_written}: written')
 
 
-def _of_sources(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Options of the sources."""
+def _source_options(arguments: argparse.Namespace) -> Any:
     from seal_friction_ros.offline.identification.sources import SourceOptions
 
-    return {**cli.options_from(arguments, SourceOptions), 'mapping': cli.mapping_of(arguments)}
+    return SourceOptions(**{**cli.options_from(arguments, SourceOptions), 'mapping': cli.mapping_of(arguments)})
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -136,14 +131,13 @@ def run(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.identification import next_readings
     from seal_friction_ros.offline.identification.pipeline import IdentifyOptions, identify
     from seal_friction_ros.offline.identification.results import identification_numbers
-    from seal_friction_ros.offline.identification.sources import SourceOptions
     from seal_friction_ros.offline.identification.wording import summary
     from seal_friction_ros.offline.work.seal_writer import write_seal
 
     if arguments.next and arguments.report and arguments.next.with_suffix('.html') == arguments.report:
         raise ValueError(f'{arguments.report}: --next writes its page there: choose another name for one of them')
-    source_options = SourceOptions(**_of_sources(arguments))
-    options = IdentifyOptions(**{**cli.options_from(arguments, IdentifyOptions), 'sources': source_options})
+    known = cli.options_from(arguments, IdentifyOptions)
+    options = IdentifyOptions(**{**known, 'sources': _source_options(arguments)})
     workers = cli.workers_of(arguments)
     found = identify(arguments.sources, options, arguments.out.stem, workers, arguments.work)
     design = next_readings.design_for(found) if arguments.next else None

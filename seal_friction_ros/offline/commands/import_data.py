@@ -28,20 +28,15 @@ def add_parser(commands: Any) -> None:
     )  # fmt: skip
     log.add_argument('logs', type=cli.place, nargs='+', metavar='LOG', help='log file, or URL of fsspec')
     cli.add_file(log, '--rig', 'rigs', 'rig file', required=True)
-    bag = cli.add_command(
-        sources, 'bag', run_bag, 'make a bag of each actuator from any rosbag with standard messages',
-        'import bag RUN --mapping robot.yaml --out run',
-    )  # fmt: skip
-    bag.add_argument(
-        'bags', type=cli.place, nargs='+', metavar='RUN', help='rosbag2 bag, MCAP or SQLite, or URL of fsspec'
-    )
+    description = 'make a bag of each actuator from any rosbag with standard messages'
+    bag = cli.add_command(sources, 'bag', run_bag, description, examples[1])
+    help_text = 'rosbag2 bag, MCAP or SQLite, or URL of fsspec'
+    bag.add_argument('bags', type=cli.place, nargs='+', metavar='RUN', help=help_text)
     cli.add_file(bag, '--mapping', 'machines', 'mapping file', required=True)
     help_text = 'topic to copy as it is, for example the command of a controller; repeat it for more'
     bag.add_argument('--also', action='append', default=[], metavar='TOPIC', help=help_text)
-    thesis = cli.add_command(
-        sources, 'thesis', run_thesis, 'make a bag from the pull test of the thesis, Tables A-1 to A-3',
-        'import thesis --out pull_test',
-    )  # fmt: skip
+    description = 'make a bag from the pull test of the thesis, Tables A-1 to A-3'
+    thesis = cli.add_command(sources, 'thesis', run_thesis, description, 'import thesis --out pull_test')
     cli.add_target(thesis, '--out', BAG, required=True, metavar='BAG', help='bag to make')
     for source, what in ((log, 'logs'), (bag, 'bags')):
         help_text = f'bag to make; of several {what} a folder with a bag each, by their names'
@@ -121,9 +116,8 @@ def _run(
         else:
             found.append({'source': source, 'out': target, 'imported': result['numbers']})
             lines.append(f'{source}: {result["text"]}')
-    return cli.print_result(
-        arguments, {'sources': found}, '\n'.join(lines), cli.UNUSABLE if errors else cli.SUCCESS, errors
-    )
+    code = cli.UNUSABLE if errors else cli.SUCCESS
+    return cli.print_result(arguments, {'sources': found}, '\n'.join(lines), code, errors)
 
 
 def run_thesis(arguments: argparse.Namespace) -> int:

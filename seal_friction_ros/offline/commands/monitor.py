@@ -22,9 +22,8 @@ def add_parser(commands: Any) -> None:
     )  # fmt: skip
     parser.add_argument('bag', type=Path, nargs='?', metavar='BAG', help='bag to show; without: the running estimators')
     cli.add_mapping(parser)
-    parser.add_argument(
-        '--allow-changes', action='store_true', help='let the page set scale, lead time and limit, and switch off'
-    )
+    help_text = 'let the page set scale, lead time and limit, and switch off'
+    parser.add_argument('--allow-changes', action='store_true', help=help_text)
     parser.add_argument('--port', type=int, default=0, metavar='N', help='port on 127.0.0.1; default: any free one')
     help_text = 'keep the token of the address in this file, for the next start; default: a new one each time'
     parser.add_argument('--token-file', type=Path, metavar='FILE', help=help_text)
@@ -33,8 +32,7 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Serve the page until SIGINT; for running estimators this process becomes the node that listens.
 
-    Raises:
-        ValueError: The options contradict each other, ROS 2 is not installed, or the bag cannot be shown.
+    ValueError: the options contradict each other, ROS 2 is not installed, or the bag cannot be shown.
     """
     if arguments.bag is not None:
         if arguments.allow_changes:
@@ -44,14 +42,10 @@ def run(arguments: argparse.Namespace) -> int:
         raise ValueError('--mapping is for a BAG: running estimators have their own')
     if find_spec('rclpy') is None:
         raise ValueError('monitor without a bag needs ROS 2: run make setup, or source a distribution')
-    options = [option for option, given in _OPTIONS.items() if getattr(arguments, given)]
+    options = [f'--{name.replace("_", "-")}' for name in ('allow_changes', 'json') if getattr(arguments, name)]
     options += ['--token-file', str(arguments.token_file)] if arguments.token_file else []
     command = [sys.executable, '-m', _NODE, '--port', str(arguments.port), *options]
     return os.execv(sys.executable, command)  # noqa: S606  nothing of the command is from a stranger
-
-
-_OPTIONS = {'--allow-changes': 'allow_changes', '--json': 'json'}
-"""Option of the node -> that of the command."""
 
 
 def _show_bag(arguments: argparse.Namespace) -> int:

@@ -19,39 +19,25 @@ def add_parser(commands: Any) -> None:
     )  # fmt: skip
     source = robot.add_mutually_exclusive_group(required=True)
     source.add_argument('--from-bag', type=Path, metavar='BAG', help='rosbag2 bag with its messages')
-    source.add_argument(
-        '--from-topics',
-        type=cli.positive,
-        nargs='?',
-        const=5.0,
-        metavar='SECONDS',
-        help='listen to the topics of the running machine, 5 s unless given; needs ROS 2',
-    )
-    robot.add_argument(
-        '--wait',
-        type=cli.positive,
-        default=15.0,  # discovery over a network takes seconds; our choice
-        metavar='SECONDS',
-        help='with --from-topics: wait for the first message, 15 s unless given',
-    )
+    seconds: dict[str, Any] = {'type': cli.positive, 'metavar': 'SECONDS'}
+    text = 'listen to the topics of the running machine, 5 s unless given; needs ROS 2'
+    source.add_argument('--from-topics', nargs='?', const=5.0, help=text, **seconds)
+    text = 'with --from-topics: wait for the first message, 15 s unless given'
+    robot.add_argument('--wait', default=15.0, help=text, **seconds)  # our choice: discovery takes seconds
     cli.add_target(robot, '--out', MAPPING_FILE, required=True, metavar='FILE.yaml', help='mapping file to write')
-    rig = cli.add_command(
-        kinds, 'rig', run_rig, 'write a rig file with what the head of a log shows, and what is missing',
-        'new rig ram.csv --out my_rig.yaml',
-    )  # fmt: skip
+    description = 'write a rig file with what the head of a log shows, and what is missing'
+    rig = cli.add_command(kinds, 'rig', run_rig, description, 'new rig ram.csv --out my_rig.yaml')
     rig.add_argument('log', type=Path, metavar='LOG', help='log file, CSV or white space')
     cli.add_target(rig, '--out', RIG_FILE, required=True, metavar='FILE.yaml', help='rig file to write')
-    help_text = 'write the SROS2 policy of machine_estimator for a machine'
-    policy = cli.add_command(
-        kinds, 'policy', run_policy, help_text, 'new policy config/machines/excavator.yaml --out policy.xml'
-    )
+    description = 'write the SROS2 policy of machine_estimator for a machine'
+    example = 'new policy config/machines/excavator.yaml --out policy.xml'
+    policy = cli.add_command(kinds, 'policy', run_policy, description, example)
     policy.add_argument('machine', type=Path, metavar='MAPPING', help='mapping file of the machine')
     cli.add_target(policy, '--out', POLICY, required=True, metavar='FILE.xml', help='policy to write')
 
 
 def run_robot(arguments: argparse.Namespace) -> int:
     """Write a mapping file from a bag, or from topics."""
-    from seal_friction_ros.files import read_machine
     from seal_friction_ros.offline.bags.new_machine import new_machine, recorded_topics
     from seal_friction_ros.offline.work.atomic_file import write_whole
 
@@ -61,7 +47,7 @@ def run_robot(arguments: argparse.Namespace) -> int:
         with recorded_topics(arguments.from_topics, arguments.wait) as bag:
             text = new_machine(bag)
     write_whole(arguments.out, text.encode())
-    return _say_open(arguments, text, {'actuators': _actuators(arguments.out, read_machine)})
+    return _say_open(arguments, text, {'actuators': _actuators(arguments.out)})
 
 
 def run_rig(arguments: argparse.Namespace) -> int:
@@ -94,9 +80,11 @@ def run_policy(arguments: argparse.Namespace) -> int:
     return cli.print_result(arguments, {'file': arguments.out}, '')
 
 
-def _actuators(path: Path, read: Any) -> list[str] | str:
+def _actuators(path: Path) -> list[str] | str:
     """Names of the actuators; why the file does not load yet, if it does not."""
+    from seal_friction_ros.files import read_machine
+
     try:
-        return [actuator.name for actuator in read(str(path)).actuators]
+        return [actuator.name for actuator in read_machine(str(path)).actuators]
     except ValueError as error:
         return str(error)

@@ -34,10 +34,8 @@ def run(arguments: argparse.Namespace) -> int:
     samples, workers = cli.samples_of(arguments), cli.workers_of(arguments)
     if not samples:
         cli.check_only_for(arguments, ('workers', 'scheduler', 'work'), '--uncertain N')
-    path = config_path('oring', arguments.case)
-    computed = compute_case(
-        path, arguments.pressures, for_seal_file=arguments.out is not None, for_samples=bool(samples)
-    )
+    path, for_seal_file = config_path('oring', arguments.case), arguments.out is not None
+    computed = compute_case(path, arguments.pressures, for_seal_file=for_seal_file, for_samples=bool(samples))
     numbers, text, uncertainty = cli.json_value(computed.summary), numbers_text(computed), None
     if samples:
         from seal_friction_ros.offline.contact.sampling import uncertain_ring

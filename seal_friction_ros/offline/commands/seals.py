@@ -10,17 +10,13 @@ from seal_friction_ros.offline.work.targets import DATA_SHEET
 
 def add_parser(commands: Any) -> None:
     """Add the commands."""
-    sheet = cli.add_command(
-        commands, 'sheet', run_sheet, 'make an empty data sheet of the friction test plan: CSV, and a page to print',
-        'sheet rod_seal --seal ms28775_114 --out sheet.csv',
-    )  # fmt: skip
-    seals = cli.add_command(
-        commands, 'seals', run_seals, 'list the seal files with law, range and source', 'seals', 'seals my_seals --full'
-    )
-    charts = cli.add_command(
-        commands, 'charts', run_charts, 'write a page with the curves of a seal file',
-        'charts ms28775_114 --out ms28775_114.html',
-    )  # fmt: skip
+    text = 'make an empty data sheet of the friction test plan: CSV, and a page to print'
+    example = 'sheet rod_seal --seal ms28775_114 --out sheet.csv'
+    sheet = cli.add_command(commands, 'sheet', run_sheet, text, example)
+    text = 'list the seal files with law, range and source'
+    seals = cli.add_command(commands, 'seals', run_seals, text, 'seals', 'seals my_seals --full')
+    text, example = 'write a page with the curves of a seal file', 'charts ms28775_114 --out ms28775_114.html'
+    charts = cli.add_command(commands, 'charts', run_charts, text, example)
     text = 'sheet to write; a page goes beside it'
     cli.add_target(sheet, '--out', DATA_SHEET, required=True, metavar='SHEET.csv', help=text)
     cli.add_file(sheet, '--seal', 'seals', 'seal file whose geometry is filled in')
@@ -49,32 +45,20 @@ _OF_SHEET: dict[str, tuple[str, cli.Settings]] = {
     '--force-unit': ('default N', {'choices': ('N', 'kN', 'lbf'), 'default': 'N'}),
     '--length-unit': ('default mm', {'choices': ('mm', 'in'), 'default': 'mm'}),
 }
+_OF_PLAN = ('tests', 'seals', 'pressure_unit', 'force_unit', 'length_unit')
 
 
 def run_sheet(arguments: argparse.Namespace) -> int:
     """Write the sheet."""
-    from seal_friction_ros.offline.identification.data_sheet import (
-        FrictionTestPlan,
-        geometry_of_seal_file,
-        write_sheet,
-    )
+    from seal_friction_ros.offline.identification import data_sheet
     from seal_friction_ros.offline.reports.data_sheet_page import write_data_sheet_page
 
+    geometry = data_sheet.geometry_of_seal_file(arguments.seal)[0] if arguments.seal else None
     low, high, steps = arguments.pressures
-    plan = FrictionTestPlan(
-        arguments.name,
-        low,
-        high,
-        steps,
-        tests=arguments.tests,
-        seals=arguments.seals,
-        pressure_unit=arguments.pressure_unit,
-        force_unit=arguments.force_unit,
-        length_unit=arguments.length_unit,
-        geometry=geometry_of_seal_file(arguments.seal)[0] if arguments.seal else None,
-    )
+    given = {name: getattr(arguments, name) for name in _OF_PLAN}
+    plan = data_sheet.FrictionTestPlan(arguments.name, low, high, steps, geometry=geometry, **given)
     sheet, page = arguments.out, arguments.out.with_suffix('.html')
-    write_sheet(plan, sheet)
+    data_sheet.write_sheet(plan, sheet)
     write_data_sheet_page(plan, page)
     return cli.print_result(arguments, {'sheet': sheet, 'page': page}, '')
 

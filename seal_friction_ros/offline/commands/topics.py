@@ -18,22 +18,10 @@ def add_parser(commands: Any) -> None:
     description = 'look at the topics of running nodes, set parameters, call services: where there is no ros2 command'
     examples = ('topics list', 'topics hz rod_velocity', 'topics param friction_estimator feedforward.scale 0.0')
     steps = cli.add_group(commands, 'topics', 'COMMAND', description, *examples)
-    listed = cli.add_command(steps, 'list', run, 'list topics with type, publishers and subscribers', 'topics list')
-    rate = cli.add_command(
-        steps, 'hz', run, 'measure the rate of a topic and the gaps between its messages', 'topics hz rod_velocity'
+    listed, rate, shown, parameter, call = (
+        cli.add_command(steps, action, run, text, *(f'topics {action}{example}' for example in of_action))
+        for action, (text, *of_action) in _ACTIONS.items()
     )
-    shown = cli.add_command(
-        steps, 'echo', run, 'print the messages of a topic', 'topics echo friction_estimate --count 1'
-    )
-    parameter = cli.add_command(
-        steps, 'param', run, 'list, get or set parameters of a node',
-        'topics param friction_estimator',
-        'topics param friction_estimator feedforward.scale',
-        'topics param friction_estimator feedforward.scale 0.0',
-    )  # fmt: skip
-    call = cli.add_command(
-        steps, 'call', run, 'call a service', 'topics call friction_estimator/start_recording'
-    )  # fmt: skip
     for step in (rate, shown):
         step.add_argument('topic', help='name of the topic')
         text = 'time to listen, 5 s unless given' if step is rate else 'time to listen at most; default: until Ctrl-C'
@@ -44,11 +32,26 @@ def add_parser(commands: Any) -> None:
     parameter.add_argument('value', nargs='?', help='value to set, as in YAML')
     call.add_argument('service', help='name of the service')
     call.add_argument('request', nargs='?', default='{}', help='fields of the request, as in YAML; default: empty')
-    for step, action in ((listed, 'list'), (rate, 'hz'), (shown, 'echo'), (parameter, 'param'), (call, 'call')):
+    for step, action in zip((listed, rate, shown, parameter, call), _ACTIONS, strict=True):
         wait, what = (1.5, 'the names on the graph') if step is listed else (10.0, 'a name on the graph or an answer')
         text = f'wait for {what}, {wait:g} s unless given'
         step.add_argument('--wait', type=cli.positive, default=wait, metavar='SECONDS', help=text)
         step.set_defaults(action=action)
+
+
+_ACTIONS = {
+    'list': ('list topics with type, publishers and subscribers', ''),
+    'hz': ('measure the rate of a topic and the gaps between its messages', ' rod_velocity'),
+    'echo': ('print the messages of a topic', ' friction_estimate --count 1'),
+    'param': (
+        'list, get or set parameters of a node',
+        ' friction_estimator',
+        ' friction_estimator feedforward.scale',
+        ' friction_estimator feedforward.scale 0.0',
+    ),
+    'call': ('call a service', ' friction_estimator/start_recording'),
+}
+"""Action -> its description, and what follows its name in examples."""
 
 
 def run(arguments: argparse.Namespace) -> int:

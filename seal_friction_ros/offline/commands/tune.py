@@ -20,11 +20,8 @@ def add_parser(commands: Any) -> None:
     )  # fmt: skip
     simulated = parser.add_argument_group('on the simulated servo, without --bag')
     recorded = parser.add_argument_group('on a recorded axis')
-    groups: Any = {
-        (TuningSettings,): simulated,
-        (RecordedAxisSettings,): recorded,
-        (TuningSettings, RecordedAxisSettings): parser,
-    }
+    both = (TuningSettings, RecordedAxisSettings)
+    groups: Any = {(TuningSettings,): simulated, (RecordedAxisSettings,): recorded, both: parser}
     recorded.add_argument('--bag', type=Path, help='tune on this bag of a real axis instead of the simulated servo')
     help_text = 'tune on this simulated machine: parameter file of servo_simulator'
     simulated.add_argument('--machine', type=Path, metavar='FILE.yaml', help=help_text)
@@ -40,7 +37,7 @@ def add_parser(commands: Any) -> None:
         unit = f' [{meaning.unit}]' if meaning.unit else ''
         text = f'{meaning.description}{unit}'.replace('%', '%%')
         number = int if name == 'seed' else float
-        kinds = tuple(kind for kind in (TuningSettings, RecordedAxisSettings) if name in meanings(kind))
+        kinds = tuple(kind for kind in both if name in meanings(kind))
         groups[kinds].add_argument(f'--{name.replace("_", "-")}', type=number, metavar='X', help=text)
     description = 'write a page on a simulated servo with and without friction'
     cli.add_page(cli.add_command(commands, 'servo', run_servo, description, 'servo --out servo.html', needs=('numba',)))
@@ -56,16 +53,8 @@ def run(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.bags.actuator_bag import open_actuator
     from seal_friction_ros.offline.replay.replay import chosen_configuration
     from seal_friction_ros.offline.reports.tune_report import write_tuning_page
+    from seal_friction_ros.offline.tuning import tune
     from seal_friction_ros.offline.tuning.recorded_command import read_output_gain
-    from seal_friction_ros.offline.tuning.tune import (
-        DEFAULT_MACHINE,
-        load_machine,
-        page_of,
-        told,
-        tune_bag,
-        tune_simulator,
-        write_parameters,
-    )
 
     given = _given(arguments)
     configuration = chosen_configuration(arguments.params, arguments.seal)
@@ -75,15 +64,15 @@ def run(arguments: argparse.Namespace) -> int:
         axis = open_actuator(arguments.bag, arguments.namespace, cli.mapping_of(arguments))
         if arguments.command_topic:
             gain = read_output_gain(axis, arguments.command_topic, known)
-        tuning: Any = tune_bag(axis, known, configuration)
+        tuning: Any = tune.tune_bag(axis, known, configuration)
         actuator = actuator or tuning.actuator
     else:
-        machine = load_machine(arguments.machine) if arguments.machine else DEFAULT_MACHINE
-        tuning = tune_simulator(TuningSettings(**given), configuration, machine)
-    page = page_of(arguments.out)
+        machine = tune.load_machine(arguments.machine) if arguments.machine else tune.DEFAULT_MACHINE
+        tuning = tune.tune_simulator(TuningSettings(**given), configuration, machine)
+    page = arguments.out.with_suffix('.html')
     numbers = {**tuning.numbers, 'file': arguments.out, 'page': page, 'figures': write_tuning_page(tuning, page)}
-    write_parameters(arguments.out, tuning, actuator)
-    text = told(tuning)
+    tune.write_parameters(arguments.out, tuning, actuator)
+    text = tune.told(tuning)
     if gain is not None:
         numbers['output_gain'], numbers['output_gain_standard_error'] = gain.gain, gain.standard_error
         text += (
@@ -95,11 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _given(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Settings that were given.
-
-    Raises:
-        ValueError: One of them belongs to the other kind of tuning.
-    """
+    """Settings that were given; ValueError if one of them belongs to the other kind of tuning."""
     kind, other = (RecordedAxisSettings, TuningSettings) if arguments.bag else (TuningSettings, RecordedAxisSettings)
     given = {name: value for name in _settings() if (value := getattr(arguments, name)) is not None}
     foreign = [name for name in given if name in meanings(other) and name not in meanings(kind)]

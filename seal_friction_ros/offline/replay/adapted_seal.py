@@ -14,21 +14,10 @@ from seal_friction_ros.offline.work.seal_writer import rounded, write_seal
 
 
 def write_adapted_seal(bags: Sequence[Path], seal: Path, out: Path, namespace: str = '') -> dict[str, Any]:
-    """Write ``seal`` with the scale learnt from the bags, one after the other, as its ``friction_scale``.
+    """Write ``seal`` with the scale learnt from bags, in order of time, as its ``friction_scale``; the numbers learnt.
 
     The standard deviation stays that of the file: the scale is that of these days, and the next day differs again.
-
-    Args:
-        bags: In order of time.
-        seal: Seal file to begin with.
-        out: Seal file to write.
-        namespace: Use only topics below it.
-
-    Returns:
-        The numbers learnt.
-
-    Raises:
-        ValueError: A bag or the seal file cannot be used, or the last bag has too few reversals to learn from.
+    ValueError: a bag or the seal file cannot be used, or the last bag has too few reversals to learn from.
     """
     override = chosen_configuration(None, seal)
     state = None
@@ -36,10 +25,8 @@ def write_adapted_seal(bags: Sequence[Path], seal: Path, out: Path, namespace: s
         state = bag_health(bag, namespace, override, state).learnt or state
     found = learnt(state or NOT_ADAPTED)
     if found.scale_std < 0.0:
-        raise ValueError(
-            f'{bags[-1]}: too few reversals at even speed to learn a scale: move the rod to and fro at least four '
-            'times, or give adaptation.moving_mass'
-        )
+        hint = 'move the rod to and fro at least four times, or give adaptation.moving_mass'
+        raise ValueError(f'{bags[-1]}: too few reversals at even speed to learn a scale: {hint}')
     document = dict(read_yaml(config_path('seals', str(seal))))
     before = parse_seal(document).friction_scale
     document['friction_scale'] = rounded(before * found.scale, 6)

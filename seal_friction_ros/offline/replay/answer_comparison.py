@@ -41,22 +41,15 @@ class ReplayResult(NamedTuple):
             return f'{counts}, identical to the byte'
         if not self.recorded_estimates:
             return 'no estimates in the bag to compare with'
-        recorded = self.recorded_estimates + self.recorded_feedforwards
-        reason = ''
+        recorded, reason = self.recorded_estimates + self.recorded_feedforwards, ''
         if self.recorded_version != ALGORITHM_VERSION:
-            reason = (
-                f': version {self.recorded_version} of the algorithm made them, this is version {ALGORITHM_VERSION} '
-                '(see CHANGELOG.rst)'
-            )
+            made = f'version {self.recorded_version} of the algorithm made them'
+            reason = f': {made}, this is version {ALGORITHM_VERSION} (see CHANGELOG.rst)'
         return f'{self.differing} of {recorded} recorded messages differ{reason}; {self.first_difference}'
 
 
 class AnswerStream:
-    """Recorded answers of one message type, and the replayed ones that wait for them.
-
-    Args:
-        type_name: The message type.
-    """
+    """Recorded answers of one message type, and the replayed ones that wait for them."""
 
     def __init__(self, type_name: str) -> None:
         self.type_name = type_name

@@ -6,6 +6,7 @@ with its length.
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,7 +29,7 @@ from seal_friction_ros.offline.bags.bag import BagError
 from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS
 from seal_friction_ros.offline.replay.bag_parts import Chosen, try_bags
-from seal_friction_ros.offline.replay.compiled_replay import Run, compile_now, first_configurations, kinds_of_topics
+from seal_friction_ros.offline.replay.compiled_replay import Run, compile_first, kinds_of_topics
 from seal_friction_ros.offline.work.executor import Workers
 from seal_friction_ros.offline.work.finished_parts import NOWHERE, Kept
 from seal_friction_ros.offline.work.outcome import Outcome
@@ -76,7 +77,7 @@ def bag_health(
     source = open_actuator(bag, namespace, mapping)
     run = _Observer(_observing(override or default_configuration()), has_override=override is not None)
     if learnt is not None:
-        run.learn_on(learnt)
+        run.state.estimator.adaptation = learnt
     try:
         for messages, answers in run.answered(source.blocks(kinds_of_topics(source.topics))):
             estimates = _estimates(answers)
@@ -106,14 +107,10 @@ def health_of_bags(
     """`bag_health` of bags without ``learnt``, ``workers`` of them at a time; outcomes in the order of the bags.
 
     The estimator is compiled once before the worker processes begin; a cluster compiles once for each of its workers.
-
-    Raises:
-        ValueError: The work folder or the cluster cannot be used.
+    ValueError: the work folder or the cluster cannot be used.
     """
-    return try_bags(
-        'health', bags, BagHealth, _health, Chosen(namespace, mapping, override), workers, kept,
-        lambda: compile_now(first_configurations(bags, namespace, override, mapping)),
-    )  # fmt: skip
+    chosen = Chosen(namespace, mapping, override)
+    return try_bags('health', bags, BagHealth, _health, chosen, workers, kept, partial(compile_first, bags, chosen))
 
 
 def _health(bag: Path, chosen: Chosen) -> BagHealth:
@@ -161,15 +158,11 @@ def _with_block(starts: Starts, estimates: Any) -> tuple[Starts, list[float]]:
 class _Observer(Run):
     """Estimator with ``adaptation.mode`` observe, which keeps what it has learnt when the configuration changes."""
 
-    def learn_on(self, learnt: AdaptationState) -> None:
-        """Go on with what was learnt before."""
-        self.state.estimator.adaptation = learnt
-
     def configure(self, snapshot: Snapshot) -> None:
         """Take a recorded configuration."""
         learnt = self.state.estimator.adaptation
         super().configure(snapshot._replace(configuration=_observing(snapshot.configuration)))
-        self.learn_on(learnt)
+        self.state.estimator.adaptation = learnt
 
 
 def _observing(configuration: Configuration) -> Configuration:

@@ -8,16 +8,9 @@ from typing import Any, NamedTuple
 from seal_friction_ros.core.estimation.configuration import Configuration, first_snapshot, snapshot_text
 from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 from seal_friction_ros.offline.work.executor import Workers, nothing
-from seal_friction_ros.offline.work.finished_parts import (
-    Kept,
-    Part,
-    content_of,
-    input_digests,
-    part_key,
-    try_parts,
-)
+from seal_friction_ros.offline.work.finished_parts import Kept, Part, keys_of, try_parts
 from seal_friction_ros.offline.work.outcome import Outcome
-from seal_friction_ros.offline.work.places import Place, as_path
+from seal_friction_ros.offline.work.places import Place, as_path, with_name
 
 
 class Chosen(NamedTuple):
@@ -58,18 +51,12 @@ def try_bags(
     """
     override, mapping = chosen.override, chosen.mapping
     known = [chosen.namespace, snapshot_text(first_snapshot(override)) if override else '']
-    known += [content_of(mapping)] if mapping else []
-    keys = [f'{number}' for number in range(len(bags))]
-    if kept.folder is not None:
-        digests = input_digests(bags, workers)
-        keys = [
-            part_key(kind, [str(bag), one.result or one.error, *known]) for bag, one in zip(bags, digests, strict=True)
-        ]
+    keys = keys_of(kind, bags, list(map(str, bags)), [*known, mapping], workers, kept)
     calls = [partial(_computed, bag, call, chosen) for bag in bags]
     parts = [Part(key, record._fields, one) for key, one in zip(keys, calls, strict=True)]
     outcomes = try_parts(f'{kind} of {len(bags)} bags', parts, workers, kept, prepare)
     return [
-        Outcome(None, _naming(bag, error)) if values is None else Outcome(record(**values))
+        Outcome(None, with_name(bag, error)) if values is None else Outcome(record(**values))
         for bag, (values, error) in zip(bags, outcomes, strict=True)
     ]
 
@@ -77,7 +64,3 @@ def try_bags(
 def _computed(bag: Place, call: Callable[[Path, Chosen], Any], chosen: Chosen) -> Any:
     with as_path(bag) as path:
         return call(path, chosen)
-
-
-def _naming(bag: Place, error: str) -> str:
-    return error if str(bag) in error else f'{bag}: {error}'

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,8 +17,8 @@ from seal_friction_ros.core.messages.records import Status
 from seal_friction_ros.offline.bags.bag import BagError, bag_topics
 from seal_friction_ros.offline.replay.bag_health import bag_health
 from seal_friction_ros.offline.replay.bag_parts import AS_RECORDED, Chosen, try_bags
-from seal_friction_ros.offline.replay.compiled_replay import compile_now, first_configurations
-from seal_friction_ros.offline.replay.health_indicators import Limits, alarms_of, day_of
+from seal_friction_ros.offline.replay.compiled_replay import compile_first
+from seal_friction_ros.offline.replay.health_indicators import UNKNOWN_DAY, Limits, alarms_of, day_of
 from seal_friction_ros.offline.replay.parallel_replay import verify
 from seal_friction_ros.offline.work.executor import Workers
 from seal_friction_ros.offline.work.finished_parts import Kept
@@ -55,41 +56,32 @@ class BagSummary(NamedTuple):
 
 
 def bag_summary(bag: Path, chosen: Chosen = AS_RECORDED) -> BagSummary:
-    """Replay a bag and follow its seals.
-
-    Args:
-        bag: The bag.
-        chosen: What of it is used, and how.
-
-    Raises:
-        BagError: The bag cannot be read.
-    """
+    """Replay a bag and follow its seals; BagError if it cannot be read."""
     replayed, difference = _replayed(bag, chosen)
     levels, why = _Levels(), ''
     try:
         seen = bag_health(bag, chosen.namespace, chosen.override, on_block=levels.add, mapping=chosen.mapping)
     except BagError as error:
         seen, why = None, str(error)
-    day = None if seen is None else day_of(str(bag), seen)
-    scale, drift = (day.scale, day.break_in) if day else (None, None)
-    table = levels.table()
+    day = UNKNOWN_DAY if seen is None else day_of(str(bag), seen)
+    drift, table = day.break_in, levels.table()
     return BagSummary(
-        levels.first * 1e-9,
-        (levels.last - levels.first) * 1e-9,
-        sum(topic.message_count for topic in bag_topics(bag).values()),
-        replayed,
-        difference,
-        day.reversals if day else 0,
-        scale.value if scale else math.nan,
-        scale.std if scale else math.nan,
-        1.0 / (1.0 + drift.value) - 1.0 if drift else math.nan,
-        drift.std / (1.0 + drift.value) ** 2 if drift else math.nan,
-        day.offset.value if day else math.nan,
-        _relative_residual(table),
-        _mean(table, 'disagreeing'),
-        '; '.join(alarms_of(day, Limits())) if day else '',
-        why,
-        table,
+        start=levels.first * 1e-9,
+        duration=(levels.last - levels.first) * 1e-9,
+        messages=sum(topic.message_count for topic in bag_topics(bag).values()),
+        replay=replayed,
+        difference=difference,
+        reversals=day.reversals,
+        scale=day.scale.value,
+        scale_std=day.scale.std,
+        drift=1.0 / (1.0 + drift.value) - 1.0,
+        drift_std=drift.std / (1.0 + drift.value) ** 2,
+        offset=day.offset.value,
+        residual=_relative_residual(table),
+        disagreeing=_mean(table, 'disagreeing'),
+        alarms='; '.join(alarms_of(day, Limits())),
+        health=why,
+        levels=table,
     )
 
 
@@ -132,11 +124,10 @@ class _Levels:
     def add(self, messages: Messages, answers: Answers, estimates: Any) -> None:
         """Take a block; arguments as of ``on_block`` of `bag_health`."""
         if len(messages.received):
-            first, last = int(messages.received[0]), int(messages.received[-1])
-            self.first = first if math.isnan(self.first) else self.first
-            self.last = last
-        places, pressures = _pressures(messages)
-        known = np.append(self._pressure, pressures)
+            self.first = int(messages.received[0]) if math.isnan(self.first) else self.first
+            self.last = int(messages.received[-1])
+        places, _, chambers = numbers_of(messages, Kind.PRESSURE, PRESSURE_TYPE)
+        known = np.append(self._pressure, np.maximum(*chambers))
         self._pressure = float(known[-1])
         before = np.searchsorted(places, np.flatnonzero(answers.estimate_sizes))
         pressure = known[before]
@@ -146,16 +137,8 @@ class _Levels:
         chosen, level = estimates[usable], np.floor(pressure[usable] / LEVEL).astype(np.int64)
         residual = chosen['residual'] * chosen['direction']
         disagrees = (chosen['status'] & int(Status.MODEL_DISAGREES)) != 0
-        columns = np.array(
-            [
-                np.ones(len(chosen)),
-                np.abs(chosen['friction_force']),
-                chosen['coulomb_friction'],
-                residual,
-                residual**2,
-                disagrees,
-            ]
-        )
+        friction, coulomb = np.abs(chosen['friction_force']), chosen['coulomb_friction']
+        columns = np.array([np.ones(len(chosen)), friction, coulomb, residual, residual**2, disagrees])
         for one in np.unique(level).tolist():
             self._sums[one] = self._sums.get(one, np.zeros(len(columns))) + columns[:, level == one].sum(axis=1)
 
@@ -169,27 +152,13 @@ class _Levels:
         return np.array(rows, float).reshape(-1, len(LEVEL_COLUMNS))
 
 
-def _pressures(messages: Messages) -> tuple[Any, FloatArray]:
-    """Numbers of the pressure messages of a block, and the larger chamber pressure [Pa] of each."""
-    places, _, chambers = numbers_of(messages, Kind.PRESSURE, PRESSURE_TYPE)
-    larger: FloatArray = np.maximum(*chambers)
-    return places, larger
-
-
 _COMPILED_BAGS = 20  # bags whose laws are compiled before the work (our choice); another law compiles with its bag
 
 
 def summaries(bags: Sequence[Place], chosen: Chosen, workers: Workers, kept: Kept) -> list[Outcome[BagSummary]]:
-    """`bag_summary` of each bag, in their order; arguments as of `try_bags`.
-
-    Raises:
-        ValueError: The work folder or the cluster cannot be used.
-    """
-    first = bags[:_COMPILED_BAGS]
-    outcomes = try_bags(
-        'fleet', bags, BagSummary, bag_summary, chosen, workers, kept,
-        lambda: compile_now(first_configurations(first, chosen.namespace, chosen.override, chosen.mapping)),
-    )  # fmt: skip
+    """`bag_summary` of each bag, in their order; arguments and errors as of `try_bags`."""
+    prepare = partial(compile_first, bags[:_COMPILED_BAGS], chosen)
+    outcomes = try_bags('fleet', bags, BagSummary, bag_summary, chosen, workers, kept, prepare)
     return [one._replace(result=one.result and _with_rows(one.result)) for one in outcomes]
 
 

@@ -26,6 +26,7 @@ class FieldDifference:
     outside: int  # number of pairs with a difference outside the tolerance
 
 
+_NO_DIFFERENCE = FieldDifference(0.0, 0.0, 0)
 _Numbers = npt.NDArray[np.int64]
 _Decoded = tuple[bytes, dict[str, Any]]  # bytes and fields of a message
 
@@ -40,9 +41,6 @@ class _Topic(NamedTuple):
     def messages(self) -> Iterator[BagMessage]:
         """Its messages."""
         return (message for message in self.read() if message.topic == self.name)
-
-
-_NO_DIFFERENCE = FieldDifference(0.0, 0.0, 0)
 
 
 @dataclass(frozen=True)
@@ -73,12 +71,9 @@ class BagComparison:
         differing = {name: field for name, field in self.fields.items() if field.largest > 0.0}
         a, b = self.messages_a - self.pairs, self.messages_b - self.pairs
         lonely = f', {a} of the first and {b} of the second without a partner of the same stamp' if a or b else ''
-        return '\n'.join(
-            [
-                f'{self.messages_a} and {self.messages_b} messages on {self.topic}{lonely}: {result}',
-                *(f'{name}: largest {f.largest:.6g}, RMS {f.rms:.6g}' for name, f in differing.items()),
-            ]
-        )
+        fields = (f'{name}: largest {f.largest:.6g}, RMS {f.rms:.6g}' for name, f in differing.items())
+        counts = f'{self.messages_a} and {self.messages_b} messages on {self.topic}{lonely}: {result}'
+        return '\n'.join([counts, *fields])
 
 
 def compare(

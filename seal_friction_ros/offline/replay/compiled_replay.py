@@ -21,9 +21,9 @@ from seal_friction_ros.offline.bags import block_reader
 from seal_friction_ros.offline.bags.actuator_bag import TYPES, Topics, first_snapshot, open_actuator
 from seal_friction_ros.offline.bags.bag import KindOf
 from seal_friction_ros.offline.bags.block_reader import read_in_bulk
-from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS
 from seal_friction_ros.offline.replay.answer_comparison import AnswerStream, ReplayResult, replay_result
+from seal_friction_ros.offline.replay.bag_parts import AS_RECORDED, Chosen
 from seal_friction_ros.offline.work.places import Place
 
 _RECORDED = {ESTIMATE_TYPE: Kind.ESTIMATE, FEEDFORWARD_TYPE: Kind.FEEDFORWARD}
@@ -32,16 +32,10 @@ _RECORDED = {ESTIMATE_TYPE: Kind.ESTIMATE, FEEDFORWARD_TYPE: Kind.FEEDFORWARD}
 def replay_in_bulk(
     bag: Path, topics: Topics, override: Configuration | None, advance: Callable[[int], None]
 ) -> ReplayResult | None:
-    """Replay a bag and compare with the recorded answers, as `replay` does.
+    """Replay a bag and compare with the recorded answers, as `replay` does; ``override`` as there.
 
-    Args:
-        bag: The bag.
-        topics: The estimator's topics in it.
-        override: Configuration instead of the recorded one.
-        advance: Called with the number of messages done since the last call.
-
-    Returns:
-        The result; None if the bag is malformed, unreadable or unusual, so that only `replay` can handle it.
+    ``advance`` is called with the number of messages done since the last call. None: the bag is malformed, unreadable
+    or unusual, so that only `replay` can handle it.
     """
     done = 0
 
@@ -85,16 +79,10 @@ class Run:
         *,
         may_be_cut: bool = True,
     ) -> ReplayResult:
-        """Answers to the blocks, compared with the recorded ones.
+        """Answers to the blocks in order, compared with the recorded ones; raises UnsuitedError as `receive_all`.
 
-        Args:
-            blocks: In order.
-            topics: The estimator's topics.
-            advance: Called with the number of messages of each block.
-            may_be_cut: Whether the recording may have stopped between the last message and its answer.
-
-        Raises:
-            UnsuitedError: As `receive_all`.
+        ``advance`` is called with the number of messages of each block. ``may_be_cut``: the recording may have stopped
+        between the last message and its answer.
         """
         velocities, is_cut = 0, False
         streams = {type_name: _BulkAnswerStream(type_name) for type_name, topic in topics.answers.items() if topic}
@@ -135,39 +123,29 @@ class Run:
 def compile_now(configurations: Iterable[Configuration] = ()) -> None:
     """Compile in this process, so that worker processes inherit the compiled code.
 
-    Args:
-        configurations: What the bags are replayed with; each kind of law is compiled once. None: the default one.
+    Each kind of law in the ``configurations``, which bags are replayed with, is compiled once. None: the default one.
     """
     none = Messages(np.frombuffer(bytes(1), np.uint8), np.zeros(0, np.uint8), *np.zeros((4, 0), np.int64))
     for configuration in list(configurations) or [default_configuration()]:
         parameters = configuration.parameters()
         _, answers = receive_all(parameters, init(parameters), none)
-    _compare(
-        0, 0, False, (answers.data, none.offsets, none.sizes), (none.data, none.offsets, none.sizes), none.sizes, 0
-    )
+    places = none.offsets, none.sizes
+    _compare(0, 0, False, (answers.data, *places), (none.data, *places), none.sizes, 0)
     block_reader.compile_now()
 
 
-def first_configurations(
-    bags: Sequence[Place], namespace: str, override: Configuration | None, mapping: MappingFile | None = None
-) -> list[Configuration]:
-    """What each bag is replayed with at its beginning; the default where a bag has no configuration or is unreadable.
+def compile_first(bags: Sequence[Place], chosen: Chosen = AS_RECORDED) -> None:
+    """`compile_now` what each bag is replayed with at its beginning; a URL is not read.
 
-    Only for `compile_now`: the replay itself reports what is wrong with a bag.
-
-    Args:
-        bags: The bags; a URL is not read.
-        namespace: Use only topics below it.
-        override: Configuration instead of the recorded ones.
-        mapping: As of `open_actuator`.
+    That is the default where a bag has no configuration or is unreadable: the replay itself says what is wrong with it.
     """
     paths = [bag for bag in bags if isinstance(bag, Path)]
-    return [override] if override else [_first_configuration(bag, namespace, mapping) for bag in paths]
+    compile_now([chosen.override] if chosen.override else [_first_configuration(bag, chosen) for bag in paths])
 
 
-def _first_configuration(bag: Path, namespace: str, mapping: MappingFile | None) -> Configuration:
+def _first_configuration(bag: Path, chosen: Chosen) -> Configuration:
     try:
-        source = open_actuator(bag, namespace, mapping)
+        source = open_actuator(bag, chosen.namespace, chosen.mapping)
         topic = source.topics.configuration
         first = first_snapshot(bag, source.messages(), topic) if topic else None
     except (ValueError, OSError, *ERRORS):
@@ -203,13 +181,7 @@ class _BulkAnswerStream(AnswerStream):
     """An `AnswerStream` for blocks: compiled code compares the expected order, `AnswerStream` the rest one by one."""
 
     def compare_block(self, messages: Messages, answers: Answers, kind: Kind) -> None:
-        """Compare the recorded messages of a block with the answers before them.
-
-        Args:
-            messages: The block.
-            answers: Answers to its messages.
-            kind: `Kind.ESTIMATE` or `Kind.FEEDFORWARD`.
-        """
+        """Compare the recorded messages of a block, of kind ESTIMATE or FEEDFORWARD, with the answers before them."""
         places = answers[1:3] if kind == Kind.ESTIMATE else answers[3:5]
         made = np.flatnonzero(places[1])
         offsets, sizes = places[0][made], places[1][made]

@@ -50,19 +50,17 @@ class Day(NamedTuple):
     friction: float  # [N] by the seal file, median over the reversals
 
 
+UNKNOWN_DAY = Day('', math.nan, 0, NOT_TOLD, NOT_TOLD, NOT_TOLD, NOT_TOLD, NOT_TOLD, NOT_TOLD, math.nan)
+
+
 def day_of(name: str, seen: BagHealth) -> Day:
     """Indicators of a bag."""
     count = len(seen.scale)
     quarter = max(count // 4, 1)
     if not count:
-        nothing = NOT_TOLD
-        return Day(name, math.nan, 0, nothing, nothing, nothing, nothing, nothing, nothing, math.nan)
+        return UNKNOWN_DAY._replace(name=name)
     early, late = _mean(seen.scale[:quarter]), _mean(seen.scale[-quarter:])
-    change = (
-        Value(early.value / late.value - 1.0, math.hypot(early.std, late.std) / late.value)
-        if count >= 4 * INDEPENDENT
-        else NOT_TOLD
-    )
+    change = Value(early.value / late.value - 1.0, math.hypot(early.std, late.std) / late.value)
     known = math.sqrt(float(np.mean(seen.scale_std**2)))
     scale = _mean(seen.scale[-max(count // 2, 1) :])
     pairs = 0.5 * (seen.offset[1:] + seen.offset[:-1])  # strokes alternate, so the half of the scale error cancels
@@ -74,7 +72,7 @@ def day_of(name: str, seen: BagHealth) -> Day:
         _mean(pairs) if len(pairs) else NOT_TOLD,
         _mean(seen.starts) if len(seen.starts) else NOT_TOLD,
         _asymmetry(seen),
-        change,
+        change if count >= 4 * INDEPENDENT else NOT_TOLD,
         Value(seen.noise, seen.noise / math.sqrt(2.0 * count)),
         float(np.median(seen.friction)),
     )
@@ -98,9 +96,7 @@ def _asymmetry(seen: BagHealth) -> Value:
 def trend(days: Sequence[Any], name: str) -> Value:
     """Change of an indicator [1/h], from a line weighted with the uncertainties; not told by fewer than 3 bags.
 
-    Args:
-        days: `Day`, or any record with a ``time`` [s] and the indicator.
-        name: Of the indicator.
+    ``days`` are `Day`, or any records with a ``time`` [s] and the indicator of that ``name``.
     """
     known = [(day.time, *getattr(day, name)) for day in days if math.isfinite(getattr(day, name).value)]
     if len(known) < 3 or np.ptp([time for time, *_ in known]) == 0.0:
@@ -122,9 +118,8 @@ def changes_of(seen: Iterable[BagHealth]) -> list[dict[str, float]]:
             before = known.changes
             known = watch(known, round(bag.time[i] * 1e9), float(bag.scale[i]))
             if known.changes > before:
-                found.append(
-                    {'time_s': known.changed_at * 1e-9, 'scale_before': known.before, 'scale_then': float(bag.scale[i])}
-                )
+                scales = {'scale_before': known.before, 'scale_then': float(bag.scale[i])}
+                found.append({'time_s': known.changed_at * 1e-9, **scales})
     return found
 
 

@@ -29,11 +29,7 @@ _INPUT_SIZE = 80  # [bytes] of an input in an uncompressed bag
 def verify(
     bag: Path, override: Configuration | None = None, namespace: str = '', *, bulk_from: int = BULK_FROM
 ) -> ReplayResult:
-    """`replay` without writing; a bag of at least ``bulk_from`` messages compiled, with the same result.
-
-    Raises:
-        BagError: The bag cannot be read.
-    """
+    """`replay` without writing; a bag of at least ``bulk_from`` messages compiled, with the same result and errors."""
     total = count_messages(bag_topics(bag))
     topics = _own_topics(bag, namespace) if total >= bulk_from and has_compiler() else None
     if topics is not None:
@@ -49,15 +45,10 @@ def verify(
 def verify_shared(
     bag: Path, namespace: str = '', workers: Workers = 1, *, bulk_from: int = BULK_FROM
 ) -> ReplayResult | None:
-    """Result of `verify` with the bag's own configuration, by several workers.
+    """Result of `verify` with the bag's own configuration, by several workers; ValueError without such a cluster.
 
-    Returns:
-        None: the bag is too short to share, without states between which it can be shared, or it is not identical, so
-        that it has to be replayed in one go.
-
-    Raises:
-        BagError: The bag cannot be read.
-        ValueError: The cluster cannot be used.
+    None: the bag is too short to share, without states between which it can be shared, or it is not identical, so that
+    it has to be replayed in one go.
     """
     if workers == 1 or count_messages(bag_topics(bag)) < bulk_from or not has_compiler():
         return None
@@ -85,34 +76,27 @@ def replay_many(
     """`verify` bags, ``workers`` of them at a time; outcomes in the order of the bags. A single one is shared by them.
 
     If the bags together are long, the estimator is compiled before the worker processes begin, so that all of them
-    inherit it. A cluster compiles once for each of its workers.
-
-    Raises:
-        ValueError: The work folder or the cluster cannot be used.
+    inherit it. A cluster compiles once for each of its workers. Raises as `try_bags`.
     """
     if len(bags) == 1 and isinstance(bags[0], Path) and override is None and kept == NOWHERE:
         with suppress(BagError, OSError):  # `verify` below says what is wrong with the bag
             shared = verify_shared(bags[0], namespace, workers)
             if shared is not None:
                 return [Outcome(shared)]
-    bulk_from, prepare = BULK_FROM, nothing
+    chosen, bulk_from, prepare = Chosen(namespace, override=override), BULK_FROM, nothing
     if sum(map(_size, bags)) > _INPUT_SIZE * BULK_FROM and has_compiler():
-        bulk_from, prepare = 0, partial(_compile, bags, namespace, override)
-    call = partial(_verified, bulk_from=bulk_from)
-    return try_bags('replay', bags, ReplayResult, call, Chosen(namespace, override=override), workers, kept, prepare)
+        bulk_from, prepare = 0, partial(_compile, bags, chosen)
+    return try_bags('replay', bags, ReplayResult, partial(_verified, bulk_from), chosen, workers, kept, prepare)
 
 
-def _verified(bag: Path, chosen: Chosen, *, bulk_from: int) -> ReplayResult:
+def _verified(bulk_from: int, bag: Path, chosen: Chosen) -> ReplayResult:
     return verify(bag, chosen.override, chosen.namespace, bulk_from=bulk_from)
 
 
-def _compile(bags: Sequence[Place], namespace: str, override: Configuration | None) -> None:
-    from seal_friction_ros.offline.replay.compiled_replay import (  # noqa: PLC0415  loads the compiler
-        compile_now,
-        first_configurations,
-    )
+def _compile(bags: Sequence[Place], chosen: Chosen) -> None:
+    from seal_friction_ros.offline.replay.compiled_replay import compile_first  # noqa: PLC0415  loads the compiler
 
-    compile_now(first_configurations(bags, namespace, override))
+    compile_first(bags, chosen)
 
 
 def _size(bag: Place) -> int:

@@ -1,6 +1,6 @@
 """Replay of a bag through the estimator, without ROS graph or clock: byte for byte the answers of the live node."""
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -37,8 +37,8 @@ from seal_friction_ros.offline.bags.actuator_bag import (
     RECORDED,
     TYPES,
     ActuatorBag,
+    find_topics,
     source_of,
-    topics_among,
 )
 from seal_friction_ros.offline.bags.bag import (
     CONFIGURATION_TOPIC,
@@ -53,21 +53,18 @@ from seal_friction_ros.offline.bags.bag import (
     read_definitions,
 )
 from seal_friction_ros.offline.replay.answer_comparison import AnswerStream, ReplayResult, replay_result
-from seal_friction_ros.offline.work.progress import progress
+from seal_friction_ros.offline.work.progress import counted, progress
 
 
 def chosen_configuration(params: Path | None, seal: str | Path | None) -> Configuration | None:
     """Configuration from a ROS parameter file and a seal file for all seals; None if neither is given.
 
-    Raises:
-        ValueError: A file cannot be read, or a value is invalid.
+    ValueError: a file cannot be read, or a value is invalid.
     """
     if params is None and seal is None:
         return None
     selection, feedforward, adaptation = SealSelection(), FeedForwardSettings(), DEFAULT_ADAPTATION
-    settings = EstimatorSettings(
-        stamp_age_max=0.0
-    )  # [s] off: stamps of a bag that was played are older than its receipt
+    settings = EstimatorSettings(stamp_age_max=0.0)  # off: stamps of a bag that was played are older than its receipt
     if params:
         selection, settings, feedforward, adaptation = load_parameter_file(params)
     if seal:
@@ -136,14 +133,11 @@ class Replay:
             self._take_up(first_of_replay(override or default_configuration()))
 
     def steps(self) -> Iterator[Step]:
-        """Each message in order, with the answers to it.
+        """Each message in order, with the answers to it; BagError if a message does not match its type.
 
         The configuration messages that are returned hold the configuration used: that of the replay replaces recorded
         ones, and if the bag has none, one is inserted at the start. They are marked as replayed, with the settings that
         acted. Every `STATE_PERIOD` there is the state, too, in place of those in the bag.
-
-        Raises:
-            BagError: A message does not match its type.
         """
         if not self._configuration:
             text = machine_text(first_of_replay(self._override or default_configuration()))
@@ -203,7 +197,7 @@ class Replay:
             self._plans = {**self._machine.plans, **self._ticks_and_clock(file)}
             self._topic_of = self._answers_of(file)
         else:
-            topics = self._own or topics_among(self.topics, self._bag)
+            topics = self._own or find_topics(self._bag, infos=self.topics)
             inputs = {topic: kind for topic, kind in zip(topics, TYPES, strict=True) if topic in topics.inputs}
             self._machine, self._state = machine_of(snapshot, {}, inputs)
             self._plans = dict(self._machine.plans)
@@ -211,10 +205,8 @@ class Replay:
             self.kept = {*topics, CONFIGURATION_TOPIC, self._state_topic}
         outputs = {one.output.topic: full_name(one.output.type_name) for one in file.actuators if one.output}
         self.answers = {topic: kind for (_, kind), topic in self._topic_of.items()} | outputs
-        self.compared = {t: kind for t, kind in self.answers.items() if t in self.kept and self._has(t)}
-
-    def _has(self, topic: str) -> bool:
-        return topic in self.topics and self.topics[topic].message_count > 0
+        present = {topic for topic, info in self.topics.items() if info.message_count and topic in self.kept}
+        self.compared = {topic: kind for topic, kind in self.answers.items() if topic in present}
 
     def _ticks_and_clock(self, file: MachineFile) -> dict[str, TopicPlan]:
         numbers = range(len(file.actuators))
@@ -238,11 +230,7 @@ class Replay:
         return found[0] if found else end
 
     def _answers_to(self, message: BagMessage) -> Iterable[Answer]:
-        """Answers to a message.
-
-        Raises:
-            BagError: The message does not match its type.
-        """
+        """Answers to a message; BagError if it does not match its type."""
         plan = self._plans.get(message.topic)
         if plan is None or self._machine is None or self._state is None:
             return ()
@@ -267,10 +255,8 @@ class Replay:
         self.estimates += kinds.count(ESTIMATE_TYPE)
         answers = []
         if not machine.file.together:
-            made = zip(kinds, self._made, strict=True)
-            answers = [
-                Answer(self._topic_of[n, kind], kind, encode(record, frame)) for kind, (n, record, frame) in made
-            ]
+            for kind, (name, record, frame_id) in zip(kinds, self._made, strict=True):
+                answers.append(Answer(self._topic_of[name, kind], kind, encode(record, frame_id)))
         elif self._made:
             answers = [Answer(self._topic_of['', MACHINE_TYPE], MACHINE_TYPE, encode_together(self._made))]
         commands = due_commands(machine, state, FEEDFORWARD_TYPE in kinds, received)
@@ -295,7 +281,7 @@ def replay(
     """
     replayed = Replay(bag, override, namespace)
     with progress(f'replay {bag.name}', count_messages(replayed.topics)) as advance:
-        steps = _counted(replayed.steps(), advance)
+        steps = counted(replayed.steps(), advance)
         if out is None:
             return _compare(steps, replayed)
         with BagWriter(out) as writer:
@@ -305,13 +291,6 @@ def replay(
 def count_messages(topics: Mapping[str, TopicInfo]) -> int:
     """Number of messages on all topics."""
     return sum(info.message_count for info in topics.values())
-
-
-def _counted(steps: Iterable[Step], advance: Callable[[int], None]) -> Iterator[Step]:
-    for count, step in enumerate(steps, start=1):
-        if count % 1000 == 0:
-            advance(1000)
-        yield step
 
 
 def _written(steps: Iterable[Step], replayed: Replay, writer: BagWriter) -> Iterator[Step]:

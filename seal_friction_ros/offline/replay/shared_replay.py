@@ -11,6 +11,8 @@ from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
+
 from seal_friction_ros.core.estimation.configuration import ALGORITHM_VERSION, Snapshot, parse_snapshot, snapshot_text
 from seal_friction_ros.core.messages.blocks import Kind, UnsuitedError
 from seal_friction_ros.core.messages.coder import decode_text
@@ -19,7 +21,7 @@ from seal_friction_ros.offline.bags.actuator_bag import Topics
 from seal_friction_ros.offline.bags.block_reader import Stretch, read_in_bulk, times_of
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS, LAST_TIME
 from seal_friction_ros.offline.replay.answer_comparison import ReplayResult
-from seal_friction_ros.offline.replay.compiled_replay import Run, compile_now, first_configurations, kinds_of_topics
+from seal_friction_ros.offline.replay.compiled_replay import Run, compile_first, kinds_of_topics
 from seal_friction_ros.offline.work.cluster import Cluster
 from seal_friction_ros.offline.work.executor import Workers, try_all
 
@@ -29,12 +31,7 @@ _BEGIN, _END = (0, 0), (1 << 30, LAST_TIME + 1)  # before and after every messag
 
 
 def stretches_of(bag: Path, topics: Topics, most: int) -> list[Stretch]:
-    """At most so many stretches, of about as many recorded states each; one if the bag has none.
-
-    Raises:
-        BagError: The bag cannot be read.
-        ValueError: A file is damaged or unfinished.
-    """
+    """At most so many stretches, of about as many recorded states each, or one. Raises as `times_of`."""
     states = times_of(bag, topics.state)
     step = -(-(len(states) + 1) // most)
     places = [_BEGIN, *states[step - 1 :: step], _END]
@@ -44,11 +41,7 @@ def stretches_of(bag: Path, topics: Topics, most: int) -> list[Stretch]:
 def verify_stretches(bag: Path, topics: Topics, workers: Workers) -> ReplayResult | None:
     """Result of `replay` of a long bag with its own configuration, if it is identical; computed by several workers.
 
-    Returns:
-        None: nothing is known, the bag is to be replayed in one go.
-
-    Raises:
-        ValueError: The cluster cannot be used.
+    None: nothing is known, the bag is to be replayed in one go. Raises ValueError if the cluster cannot be used.
     """
     if not topics.configuration:
         return None
@@ -60,18 +53,13 @@ def verify_stretches(bag: Path, topics: Topics, workers: Workers) -> ReplayResul
         return None
     calls = [partial(_verified, bag.absolute(), topics, stretch) for stretch in stretches]
     label = f'replay {bag.name} in {len(calls)} stretches'
-    outcomes = try_all(label, calls, workers, prepare=lambda: compile_now(first_configurations([bag], '', None)))
+    outcomes = try_all(label, calls, workers, prepare=partial(compile_first, [bag]))
     found = [outcome.result for outcome in outcomes if outcome.result is not None]
     if len(found) < len(stretches):
         return None
-    return ReplayResult(
-        sum(result.velocity_samples for result in found),
-        sum(result.recorded_estimates for result in found),
-        sum(result.recorded_feedforwards for result in found),
-        0,
-        '',
-        min(result.recorded_version for result in found),
-    )
+    samples, estimates, feedforwards = map(sum, zip(*(result[:3] for result in found), strict=True))
+    version = min(result.recorded_version for result in found)
+    return ReplayResult(samples, estimates, feedforwards, 0, '', version)
 
 
 def _verified(bag: Path, topics: Topics, stretch: Stretch) -> ReplayResult | None:
@@ -98,18 +86,12 @@ def _verified(bag: Path, topics: Topics, stretch: Stretch) -> ReplayResult | Non
 
 
 def _state_at(bag: Path, topics: Topics, file: int, time: int) -> str:
-    """Text of the state that was recorded at a log time [ns].
+    """Text of the state that was recorded at a log time [ns]; ValueError if there is none."""
 
-    Raises:
-        ValueError: There is none.
-    """
-    topic = topics.state
-
-    def kind_of(name: str, _: str) -> Kind:
-        return Kind.CONFIGURATION if name == topic else Kind.OTHER
+    def kind_of(topic: str, _: str) -> Kind:
+        return Kind.CONFIGURATION if topic == topics.state else Kind.OTHER
 
     for messages in read_in_bulk(bag, kind_of, Stretch(file, time, file, time + 1)):
-        for number in range(len(messages.kinds)):
-            if messages.kinds[number] == Kind.CONFIGURATION:
-                return decode_text(messages.message(number))
-    raise ValueError(f'{bag}: no message on {topic} at {time} ns')
+        for number in np.flatnonzero(messages.kinds == Kind.CONFIGURATION).tolist():
+            return decode_text(messages.message(number))
+    raise ValueError(f'{bag}: no message on {topics.state} at {time} ns')

@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.messages.blocks import Numbers
 from seal_friction_ros.core.messages.fields import Reader
 from seal_friction_ros.core.messages.layouts import NUMBER_TYPE, NUMBERS_TYPE
@@ -11,15 +12,7 @@ from seal_friction_ros.core.tuning.output_gain import CommandRecord, OutputGain,
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings
 from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag
 from seal_friction_ros.offline.bags.bag import BagError, read_definitions
-from seal_friction_ros.offline.bags.columns import (
-    Block,
-    Held,
-    Wanted,
-    collected,
-    extend,
-    growing,
-    wanted_of,
-)
+from seal_friction_ros.offline.bags.columns import Block, Held, Wanted, collected, extend, growing, wanted_of
 
 _FIELDS = {NUMBER_TYPE: 'data', NUMBERS_TYPE: 'data[0]'}
 _HELD = {'command': 1, 'pressure': 2, 'position': 1}
@@ -44,11 +37,7 @@ class _CommandCollector:
         extend(self.columns, np.array([velocities.stamps * 1e-9, velocities.numbers[0], *held]))
 
     def _number(self, data: bytes) -> float:
-        """The command of a message.
-
-        Raises:
-            ValueError: The message is malformed or empty.
-        """
+        """The command of a message; ValueError if it is malformed or empty."""
         (number,) = self._reader.read(data).numbers
         if number is None:
             raise ValueError('the array is empty')
@@ -56,15 +45,10 @@ class _CommandCollector:
 
 
 def read_output_gain(source: ActuatorBag, topic: str, known: RecordedAxisSettings) -> OutputGain:
-    """Gain from force to the command on a topic.
+    """Gain from force to the command on a topic, a `std_msgs/Float64` or `Float64MultiArray`.
 
-    Args:
-        source: Command, pressures, velocity and, if measured, position.
-        topic: Topic of the command, a `std_msgs/Float64` or `Float64MultiArray`.
-        known: Areas of both chambers.
-
-    Raises:
-        BagError: The bag lacks something, or cannot tell the gain.
+    The bag has the command, pressures, velocity and, if measured, position; the areas of both chambers are ``known``.
+    BagError: the bag lacks something, or cannot tell the gain.
     """
     if not (known.area_a and known.area_b):
         raise BagError(f'{topic}: give --area-a and --area-b [m2]: the gain needs the force of the pressures')
@@ -78,7 +62,5 @@ def read_output_gain(source: ActuatorBag, topic: str, known: RecordedAxisSetting
     wanted = {**wanted_of(source, ('velocity', 'pressure', 'position')), 'command': Wanted(topic, kind)}
     columns = np.array(collected(source, wanted, partial(_CommandCollector, reader)).columns)
     time, velocity, command, a, b, position = columns[:, np.isfinite(columns[2:5]).all(axis=0)]
-    try:
+    with named_errors(f'{bag}: {topic}', raised=BagError):
         return output_gain(CommandRecord(time, command, known.area_a * a - known.area_b * b, position, velocity))
-    except ValueError as error:
-        raise BagError(f'{bag}: {topic}: {error}') from None

@@ -19,35 +19,19 @@ from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.node_options import FEEDFORWARD_PREFIX
 from seal_friction_ros.core.estimation.pipeline import NO_REFERENCE, condition_reference, is_possible
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.foundation.parameters import meanings
 from seal_friction_ros.core.foundation.units import MM, MS, UM
+from seal_friction_ros.core.messages import layouts
 from seal_friction_ros.core.messages.blocks import Numbers
-from seal_friction_ros.core.messages.layouts import (
-    ESTIMATE_TYPE,
-    FEEDFORWARD_TYPE,
-    FORCE_TYPE,
-    PRESSURE_TYPE,
-    REFERENCE_TYPE,
-)
 from seal_friction_ros.core.messages.records import ServoReference
+from seal_friction_ros.core.servo import simulator_options as simulator
 from seal_friction_ros.core.servo.closed_loop import IDEAL_SENSORS, Axis, AxisSensors
 from seal_friction_ros.core.servo.sensors import SensorSettings
-from seal_friction_ros.core.servo.simulator_options import (
-    PLANT,
-    SERVO_SIMULATOR_PARAMETERS,
-    SimulatorSettings,
-    StandardMessages,
-    servo_parameters,
-)
 from seal_friction_ros.core.servo.tracking import tracking_peak, tracking_rms
 from seal_friction_ros.core.tuning.other_plants import PlantOutcome, on_plants
 from seal_friction_ros.core.tuning.recorded_axis import RecordedTuning, Recording, tune_recorded_axis
-from seal_friction_ros.core.tuning.settings import (
-    FORCE_MARGIN,
-    RecordedAxisSettings,
-    TunedFeedForward,
-    TuningSettings,
-)
+from seal_friction_ros.core.tuning.settings import FORCE_MARGIN, RecordedAxisSettings, TunedFeedForward, TuningSettings
 from seal_friction_ros.core.tuning.simulated_axis import MOST_CANDIDATES, Tuning, TuningProblem, tune
 from seal_friction_ros.files import default_configuration, read_parameters
 from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag
@@ -230,15 +214,15 @@ class SimulatedMachine(NamedTuple):
     """Plant and sensors of a simulated axis, without its seals."""
 
     name: str
-    settings: SimulatorSettings
+    settings: simulator.SimulatorSettings
     parts: Mapping[type, Any]  # records by type, as `servo_parameters` takes them
     sensors: AxisSensors
 
 
 DEFAULT_MACHINE = SimulatedMachine(
     'the simulated servo',
-    SimulatorSettings(rate=1.0 / CONTROL_PERIOD, inner_step=INNER_STEP),
-    {kind: kind() for kind in PLANT.values()},
+    simulator.SimulatorSettings(rate=1.0 / CONTROL_PERIOD, inner_step=INNER_STEP),
+    {kind: kind() for kind in simulator.PLANT.values()},
     IDEAL_SENSORS,
 )
 
@@ -247,14 +231,11 @@ def load_machine(path: Path) -> SimulatedMachine:
     """The machine of a parameter file of ``servo_simulator``.
 
     With ``messages: standard``, ``standard.load_cell: false`` is an axis without force sensor, and ``standard.velocity:
-    false`` one with an encoder of ``sensors.position_resolution``.
-
-    Raises:
-        ValueError: The file has an error, or an encoder has no resolution.
+    false`` one with an encoder of ``sensors.position_resolution``; ValueError if that is 0, or the file has an error.
     """
-    made = read_parameters(path, 'servo_simulator', SERVO_SIMULATOR_PARAMETERS)
-    settings, standard, step = made[SimulatorSettings], made[StandardMessages], made[SensorSettings].position_resolution
-    sensors = IDEAL_SENSORS
+    made = read_parameters(path, 'servo_simulator', simulator.SERVO_SIMULATOR_PARAMETERS)
+    settings, standard = made[simulator.SimulatorSettings], made[simulator.StandardMessages]
+    sensors, step = IDEAL_SENSORS, made[SensorSettings].position_resolution
     if settings.messages == 'standard':
         if not standard.velocity and not step:
             raise ValueError(f'{path}: standard.velocity: false needs a sensors.position_resolution, the encoder step')
@@ -265,19 +246,13 @@ def load_machine(path: Path) -> SimulatedMachine:
 def tune_simulator(
     settings: TuningSettings, configuration: Configuration | None = None, machine: SimulatedMachine = DEFAULT_MACHINE
 ) -> SimulatorTuning:
-    """Tune on a simulated machine, with the seals of the configuration.
+    """Tune on a simulated machine, with the seals of the configuration; ValueError if the servo cannot follow the task.
 
-    Args:
-        settings: Task of the axis, and errors of its model.
-        configuration: Seals and estimator; its feed-forward has the parameters that are not tuned.
-        machine: Plant and sensors.
-
-    Raises:
-        ValueError: The servo cannot follow the task.
+    The feed-forward of the configuration has the parameters that are not tuned.
     """
     chosen = configuration or default_configuration()
     parameters = chosen.parameters()
-    servo = servo_parameters(machine.settings, machine.parts, parameters.estimator.seals)
+    servo = simulator.servo_parameters(machine.settings, machine.parts, parameters.estimator.seals)
     problem = TuningProblem(Axis(servo, parameters, machine.sensors), settings, sensor_noise(settings))
     with progress('tune', MOST_CANDIDATES) as advance:
         found = tune(problem, advance)
@@ -303,17 +278,13 @@ def tune_bag(
         BagError: The bag cannot be read, or an input is missing in it.
     """
     recording, track, recorded = read_recording(actuator, configuration)
-    try:
+    with named_errors(actuator.path, raised=BagError):
         found = tune_recorded_axis(recording, recorded.feedforward, known)
-    except ValueError as error:
-        raise BagError(f'{actuator.path}: {error}') from None
     tuned = tuple(parameter for parameter, is_identified in found.identified.items() if is_identified)
     motion = f'{len(recording.stamps)} samples, {recording.time[-1]:.3f} s'
-    name = actuator.name
-    task = TuningTask(
-        f'bag {name}', motion, _seals_text(recorded), recorded.feedforward, tuned, recorded.has_placeholder
-    )
-    return BagTuning(name, task, recording, track, known, found, actuator.actuator)
+    seals, source = _seals_text(recorded), f'bag {actuator.name}'
+    task = TuningTask(source, motion, seals, recorded.feedforward, tuned, recorded.has_placeholder)
+    return BagTuning(actuator.name, task, recording, track, known, found, actuator.actuator)
 
 
 def sensor_noise(settings: TuningSettings) -> FloatArray:
@@ -333,16 +304,13 @@ def read_recording(
     """Recording of an axis from the first reference on, its track, and the last configuration in the bag.
 
     The estimates are computed anew. A velocity sample takes the newest other inputs. A sample whose stamp is not after
-    the previous one is left out.
-
-    Raises:
-        BagError: The bag cannot be read, or an input is missing in it.
+    the previous one is left out. BagError: the bag cannot be read, or an input is missing in it.
     """
     topics, bag = actuator.topics, actuator.path
     needed = {
-        REFERENCE_TYPE: (topics.reference, 'the feed-forward is computed from the reference'),
-        FORCE_TYPE: (topics.force, 'the friction is computed from the force sum'),
-        PRESSURE_TYPE: (topics.pressure, 'the friction depends on the pressure'),
+        layouts.REFERENCE_TYPE: (topics.reference, 'the feed-forward is computed from the reference'),
+        layouts.FORCE_TYPE: (topics.force, 'the friction is computed from the force sum'),
+        layouts.PRESSURE_TYPE: (topics.pressure, 'the friction depends on the pressure'),
     }
     for type_name, (topic, reason) in needed.items():
         if not topic:
@@ -370,11 +338,7 @@ class _AxisCollector(RunCollector):
         super().add(block)
 
     def recording(self, source: ActuatorBag) -> tuple[Recording, RecordedTrack, Configuration]:
-        """All samples from the first reference on.
-
-        Raises:
-            BagError: There are fewer than two.
-        """
+        """All samples from the first reference on; BagError if there are fewer than two."""
         own = np.frombuffer(self.stamps, np.int64)
         before = np.concatenate([places for _, places in self._references])
         newest = np.searchsorted(before, np.arange(len(own)), side='right') - 1
@@ -395,7 +359,7 @@ class _AxisCollector(RunCollector):
         return recording, RecordedTrack(run.reference[chosen], run.position[chosen]), configuration
 
 
-_FIELDS = {ESTIMATE_TYPE: 'estimate', FEEDFORWARD_TYPE: 'feedforward'}
+_FIELDS = {layouts.ESTIMATE_TYPE: 'estimate', layouts.FEEDFORWARD_TYPE: 'feedforward'}
 _OF_RUN = ('state', 'status', 'coulomb_friction', 'velocity', 'force_sum')
 
 
@@ -415,26 +379,18 @@ def _conditioned(settings: EstimatorSettings, references: Sequence[Numbers]) -> 
 # -- parameter file ---------------------------------------------------------------------------------------------------
 
 
-def page_of(out: Path) -> Path:
-    """Page that belongs to a parameter file: beside it, with the suffix ``.html``."""
-    return out.with_suffix('.html')
-
-
 def parameter_text(tuning: SimulatorTuning | BagTuning, actuator: str = '') -> str:
     """ROS parameter file of a feed-forward, with task and summary as a comment.
 
-    Args:
-        tuning: The result.
-        actuator: Of ``machine_estimator``, by its name in the mapping file; empty: for ``friction_estimator``.
+    With the name of an ``actuator`` in the mapping file it is for ``machine_estimator``, else for
+    ``friction_estimator``.
     """
     task, settings = tuning.task, tuning.found.feedforward
     comment = f'# Tuned on {task.source}: {task.motion}; seals: {task.seals}. {told(tuning)}'
     comment = ''.join(letter if letter.isprintable() else '?' for letter in comment)  # names come from outside
-    lines = [
-        MADE_FOR_MACHINE if actuator else MADE_BY,
-        *textwrap.wrap(comment, 110, subsequent_indent='# ', break_on_hyphens=False),
-    ]
-    group = '.'.join([*([actuator] if actuator else []), FEEDFORWARD_PREFIX.rstrip('.')])
+    wrapped = textwrap.wrap(comment, 110, subsequent_indent='# ', break_on_hyphens=False)
+    group = f'{actuator}.{FEEDFORWARD_PREFIX}'.strip('.')
+    lines = [MADE_FOR_MACHINE if actuator else MADE_BY, *wrapped]
     lines += [f'{MACHINE_NODE if actuator else NODE}:', '  ros__parameters:', f'    {group}:']
     for name, meaning in meanings(settings).items():
         value = yaml.safe_dump({name: getattr(settings, name)}).strip()
@@ -444,12 +400,6 @@ def parameter_text(tuning: SimulatorTuning | BagTuning, actuator: str = '') -> s
 
 
 def write_parameters(out: Path, tuning: SimulatorTuning | BagTuning, actuator: str = '') -> None:
-    """Write the parameter file, completely or not at all.
-
-    Raises:
-        ValueError: The file cannot be written.
-    """
-    try:
+    """Write the parameter file, completely or not at all; ValueError if it cannot be written."""
+    with named_errors(f'{out}: cannot write', OSError):
         write_whole(out, parameter_text(tuning, actuator).encode())
-    except OSError as error:
-        raise ValueError(f'{out}: cannot write: {error.strerror or error}') from None

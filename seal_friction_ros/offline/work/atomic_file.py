@@ -6,8 +6,7 @@ from pathlib import Path
 def write_whole(path: Path, content: bytes) -> None:
     """Write a file in one step, so that a reader never sees half of it; replace an existing file.
 
-    Raises:
-        OSError: The file cannot be written. The previous file is left unchanged.
+    OSError: the file cannot be written; the previous one is left unchanged.
     """
     partial = path.with_name(f'.{path.name}.partial')
     try:

@@ -19,6 +19,7 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
 
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.offline.work.outcome import CRASHED, THREAD_VARIABLES, Outcome, outcome_of
 from seal_friction_ros.offline.work.progress import report_shares_to
 from seal_friction_ros.offline.work.versions import versions
@@ -64,12 +65,7 @@ class _Refusal(NamedTuple):
 
 
 class _Running:
-    """Calls on a cluster that are not done yet.
-
-    Args:
-        client: Connected to the cluster.
-        calls: All calls.
-    """
+    """Calls on the cluster of a client that are not done yet."""
 
     def __init__(self, client: Any, calls: Sequence[Callable[[], Any]]) -> None:
         self.futures: dict[int, Any] = {}
@@ -87,8 +83,7 @@ class _Running:
     def next_done(self) -> tuple[int, Outcome[Any]] | None:
         """Number and outcome of a call that is done; None if there was none for a while.
 
-        Raises:
-            ValueError: The scheduler has gone, or a worker refuses the call.
+        ValueError: the scheduler has gone, or a worker refuses the call.
         """
         try:
             number = self._done.get(timeout=_LOOK_PERIOD)
@@ -189,10 +184,9 @@ def _lonely_since(client: Any, before: float | None) -> float | None:
 def _connected(cluster: Cluster) -> Iterator[Any]:
     """Client of a cluster; every error of the scheduler names its address."""
     distributed = needed('distributed')
-    for name in ('distributed', *(f'distributed.{part}' for part in ('client', 'comm', 'core', 'batched'))):
+    parts = (f'distributed.{part}' for part in ('client', 'comm', 'core', 'batched'))
+    for name in ('distributed', *parts, 'tornado.application', 'asyncio'):
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # one line tells the error, and we write it
-    for name in ('tornado.application', 'asyncio'):
-        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     security = None
     if cluster.tls:
         authority, certificate, key = map(str, cluster.tls)
@@ -206,14 +200,12 @@ def _connected(cluster: Cluster) -> Iterator[Any]:
         client = distributed.Client(cluster.address, timeout=ANSWER_TIME, security=security, set_as_default=False)
     except Exception as error:  # noqa: BLE001  whatever a stranger at this address answers
         reason = f' ({str(error).splitlines()[0][:200]})' if str(error) else ''
-        raise ValueError(
-            f'{cluster.address}: no Dask scheduler answers within {ANSWER_TIME:.0f} s: is the address right, and does '
-            f'`dask scheduler` run there?{reason}'
-        ) from None
+        hint = f'is the address right, and does `dask scheduler` run there?{reason}'
+        what = f'{cluster.address}: no Dask scheduler answers within {ANSWER_TIME:.0f} s'
+        raise ValueError(f'{what}: {hint}') from None
     try:
-        yield client
-    except ValueError as error:
-        raise ValueError(f'{cluster.address}: {error}') from None
+        with named_errors(cluster.address):
+            yield client
     finally:
         with suppress(TimeoutError):
             client.close(timeout=2.0)
@@ -228,22 +220,15 @@ async def _kind_of_server(address: str, security: Any) -> str:
 
 
 def _checked_workers(client: Any) -> int:
-    """Number of workers, of which each can give the same results as this computer.
-
-    Raises:
-        ValueError: There is none, or one that cannot.
-    """
+    """Number of workers; ValueError if there is none, or one that cannot give the results of this computer."""
     try:
         client.wait_for_workers(1, timeout=ANSWER_TIME)
         answers = client.run(_unsuited, dict(versions()), on_error='return')
         answers = {f'worker {address}': answer for address, answer in sorted(answers.items())}
         answers['the scheduler'] = _of_scheduler(client)
     except (TimeoutError, OSError):
-        if client.status == 'running':
-            raise ValueError(
-                f'it has no worker after {ANSWER_TIME:.0f} s: start one with `dask worker ADDRESS --nthreads 1`'
-            ) from None
-        raise ValueError(_GONE) from None
+        lonely = f'it has no worker after {ANSWER_TIME:.0f} s: start one with `dask worker ADDRESS --nthreads 1`'
+        raise ValueError(lonely if client.status == 'running' else _GONE) from None
     for place, answer in answers.items():
         if isinstance(answer, BaseException):
             raise ValueError(f'{place} cannot load this version of seal_friction_ros: install it there')
@@ -266,9 +251,7 @@ def _of_scheduler(client: Any) -> Any:
 def _unsuited(expected: Mapping[str, str], dask_worker: Any = None) -> str:
     """Why the worker that runs this cannot give the results of the computer with the ``expected`` versions; else empty.
 
-    Args:
-        expected: `versions` there.
-        dask_worker: The worker; None: one that was asked about its number of threads before.
+    Without ``dask_worker`` it was asked about its number of threads before.
     """
     if reason := _other_version(expected):
         return reason

@@ -8,19 +8,19 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from enum import Enum
-from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
+from seal_friction_ros.offline.work.versions import version_of
 from seal_friction_ros.packages import OPTIONAL, how_to_install
 
 PROFILES = ('FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE')
 _FIRST_PORT, _PORTS_OF_A_DOMAIN = 7410, 250  # UDP port of participant 0 of domain 0; RTPS 2.5, 9.6.2
 _MOST_PARTICIPANTS = 120  # of a domain on one computer: so many ports it has
 _ANNOUNCED_TO = {'rclpy': 32, 'profile': 100}  # participants that a new one announces itself to
-_SMALLEST_SHARED_MEMORY = 64 << 20  # [bytes] of /dev/shm for a few nodes (our choice)
-_SHARED_MEMORY = Path('/dev/shm')  # noqa: S108  looked at, never written
+SMALLEST_SHARED_MEMORY = 64 << 20  # [bytes] of /dev/shm for a few nodes (our choice)
+SHARED_MEMORY = Path('/dev/shm')  # noqa: S108  looked at, never written
 
 
 class Level(Enum):
@@ -40,12 +40,7 @@ class Finding(NamedTuple):
 
 
 def findings(environment: Mapping[str, str] = os.environ, udp: Path = Path('/proc/net/udp')) -> list[Finding]:
-    """Everything that is known, in order.
-
-    Args:
-        environment: Environment variables.
-        udp: Table of the UDP sockets of this computer.
-    """
+    """Everything that is known, in order; from environment variables and a table of UDP sockets."""
     return [
         *_versions(),
         *_ros(environment),
@@ -57,20 +52,13 @@ def findings(environment: Mapping[str, str] = os.environ, udp: Path = Path('/pro
 
 
 def _versions() -> Iterator[Finding]:
-    own = _version('seal_friction_ros') or 'not installed: run make setup, or source the colcon workspace'
+    own = version_of('seal_friction_ros', 'not installed: run make setup, or source the colcon workspace')
     yield Finding(Level.OK, 'versions', f'seal_friction_ros {own}, Python {platform.python_version()}')
     for module in OPTIONAL:
         if find_spec(module):
-            yield Finding(Level.OK, module, _version(module) or 'version unknown')
+            yield Finding(Level.OK, module, version_of(module, 'version unknown'))
         else:
             yield Finding(Level.NOTE, module, how_to_install(module))
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return ''
 
 
 def _ros(environment: Mapping[str, str]) -> Iterator[Finding]:
@@ -128,13 +116,13 @@ def _participants(environment: Mapping[str, str], udp: Path) -> Finding:
 def _shared_memory(environment: Mapping[str, str]) -> Finding:
     if 'ROS_DISTRO' not in environment and not any(map(environment.get, PROFILES)):
         return Finding(Level.OK, 'shared memory', 'not used: config/fastdds.xml has UDP alone')
-    if not os.access(_SHARED_MEMORY, os.W_OK):
-        return Finding(Level.NOTE, 'shared memory', f'{_SHARED_MEMORY} cannot be written: Fast DDS falls back to UDP')
-    free = shutil.disk_usage(_SHARED_MEMORY).free
-    files = len(list(_SHARED_MEMORY.glob('fastrtps_*')))
+    if not os.access(SHARED_MEMORY, os.W_OK):
+        return Finding(Level.NOTE, 'shared memory', f'{SHARED_MEMORY} cannot be written: Fast DDS falls back to UDP')
+    free = shutil.disk_usage(SHARED_MEMORY).free
+    files = len(list(SHARED_MEMORY.glob('fastrtps_*')))
     text = f'{free >> 20} MiB free, {files} files of Fast DDS'
-    if free < _SMALLEST_SHARED_MEMORY:
-        return Finding(Level.NOTE, 'shared memory', f'{text}: with no node running, remove {_SHARED_MEMORY}/fastrtps_*')
+    if free < SMALLEST_SHARED_MEMORY:
+        return Finding(Level.NOTE, 'shared memory', f'{text}: with no node running, remove {SHARED_MEMORY}/fastrtps_*')
     return Finding(Level.OK, 'shared memory', text)
 
 

@@ -40,7 +40,7 @@ def try_all(
     on_outcome: Callable[[int, Outcome[Result]], None] = lambda *_: None,
     prepare: Callable[[], None] = nothing,
 ) -> list[Outcome[Result]]:
-    """Run every call, whatever becomes of the others.
+    """Run every call, whatever becomes of the others, and return the outcomes in their order.
 
     Args:
         label: Of the progress bar.
@@ -49,9 +49,6 @@ def try_all(
         workers: Calls at a time, or a cluster.
         on_outcome: Called in this process with the number of a call and its outcome, as soon as it is done.
         prepare: Called before the processes of this computer begin; they inherit what it loads and compiles.
-
-    Returns:
-        Outcomes in the order of the calls.
 
     Raises:
         ValueError: The cluster cannot be used.
@@ -70,12 +67,9 @@ def run_all(
     on_result: Callable[[int, Result], None] = lambda *_: None,
     prepare: Callable[[], None] = nothing,
 ) -> list[Result]:
-    """Run calls that are of use only together; arguments as `try_all`.
+    """Run calls that are of use only together, and return their results in order; arguments as `try_all`.
 
     ``on_result`` is called in this process with the number of a call and its result, as soon as it is done.
-
-    Returns:
-        Results in the order of the calls.
 
     Raises:
         ValueError: A call failed: the first one, in the order of the calls; or the cluster cannot be used. No further
@@ -98,11 +92,8 @@ def run_all(
 class _Worker:
     """One call in a process of its own.
 
-    Args:
-        number: Number of the call.
-        call: The call.
-        others: The parent's connections to other workers. This process closes its copies of them, so that a worker
-            whose parent has gone finds its connection broken.
+    The process closes its copies of the parent's connections to ``others``, so that a worker whose parent has gone
+    finds its connection broken.
     """
 
     def __init__(self, number: int, call: Callable[[], Any], others: Sequence[Connection]) -> None:

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.documents import parse_json
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.offline.work.atomic_file import write_whole
 from seal_friction_ros.offline.work.executor import Workers, nothing, run_all, try_all
 from seal_friction_ros.offline.work.outcome import CRASHED, Outcome
@@ -47,12 +48,7 @@ NOWHERE = Kept()
 
 
 def part_key(kind: str, inputs: Any) -> str:
-    """Key of a part.
-
-    Args:
-        kind: What the part computes.
-        inputs: All inputs and settings that its result depends on, as JSON can hold them; a file by its digest.
-    """
+    """Key of a part from all that its result depends on, as JSON can hold it; a file by its digest."""
     text = f'{kind} {json.dumps([inputs, dict(versions())], sort_keys=True)}'
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
@@ -71,9 +67,7 @@ def content_of(value: Any) -> Any:
 def input_digest(path: Place) -> str:
     """Digest of the content of a file, or of the files in a folder with their names; of a URL its `url_digest`.
 
-    Raises:
-        ValueError: It is neither a file nor a folder, or a URL that cannot be read.
-        OSError: It cannot be read.
+    ValueError if it is neither a file nor a folder, or a URL that cannot be read; OSError if it cannot be read.
     """
     if isinstance(path, str):
         return url_digest(path)
@@ -90,7 +84,7 @@ def input_digest(path: Place) -> str:
 def run_parts(
     label: str, parts: Sequence[Part], workers: Workers, folder: Path | None, prepare: Callable[[], None] = nothing
 ) -> list[Values]:
-    """Results of parts that are of use only together; parts that are kept in ``folder`` are not computed.
+    """Results, in order, of parts that are of use only together; parts that are kept in ``folder`` are not computed.
 
     Args:
         label: Of the progress bar.
@@ -98,9 +92,6 @@ def run_parts(
         workers: Parts at a time, or a cluster.
         folder: Keeps every finished part as a JSON file, also when a later part fails; None keeps none.
         prepare: As of `try_all`, if a part is missing.
-
-    Returns:
-        Results in the order of the parts.
 
     Raises:
         ValueError: A part failed, or the folder or the cluster cannot be used.
@@ -117,12 +108,10 @@ def run_parts(
 def try_parts(
     label: str, parts: Sequence[Part], workers: Workers, kept: Kept, prepare: Callable[[], None] = nothing
 ) -> list[Outcome[Values]]:
-    """Outcomes of parts that may fail one by one; other arguments as of `run_parts`.
+    """Outcomes, in order, of parts that may fail one by one; other arguments as of `run_parts`.
 
-    An error of a part is kept like a result; that its process crashed is not.
-
-    Raises:
-        ValueError: The folder or the cluster cannot be used.
+    An error of a part is kept like a result; that its process crashed is not. Raises ValueError if the folder or the
+    cluster cannot be used.
     """
     outcomes, missing = _found(parts, kept)
 
@@ -133,9 +122,15 @@ def try_parts(
     return [outcomes[number] for number in range(len(parts))]
 
 
-def input_digests(paths: Sequence[Place], workers: Workers) -> list[Outcome[str]]:
-    """`input_digest` of each path."""
-    return try_all(f'digests of {len(paths)} inputs', [partial(input_digest, path) for path in paths], workers)
+def keys_of(
+    kind: str, places: Sequence[Place], names: Sequence[str], settings: Any, workers: Workers, kept: Kept
+) -> list[str]:
+    """Key of the part of each place by its name, content and the settings; its number where nothing is kept."""
+    if kept.folder is None:
+        return [str(number) for number in range(len(places))]
+    digests = try_all(f'digests of {len(places)} inputs', [partial(input_digest, one) for one in places], workers)
+    known = content_of(settings)
+    return [part_key(kind, [name, *digest, known]) for name, digest in zip(names, digests, strict=True)]
 
 
 def _found(parts: Sequence[Part], kept: Kept) -> tuple[dict[int, Outcome[Values]], list[int]]:
@@ -161,10 +156,8 @@ def _keep(
         return
     plain = {name: v.tolist() if isinstance(v, np.ndarray) else v for name, v in (values or {}).items()}
     content = {_ERROR: outcome.error} if outcome.error else plain
-    try:
+    with named_errors(f'{folder}: cannot keep a finished part', OSError):
         write_whole(folder / f'{parts[number].key}.json', json.dumps(content).encode())
-    except OSError as error:
-        raise ValueError(f'{folder}: cannot keep a finished part: {error.strerror}') from None
 
 
 _ERROR = 'error: '  # the only name in the file of a part that failed; no name of a value is spelled like this

@@ -17,11 +17,7 @@ class Outcome(NamedTuple, Generic[Result]):
 
 
 def outcome_of(call: Callable[[], Any]) -> Outcome[Any]:
-    """Outcome of a call; an exception that is no expected error is raised.
-
-    Raises:
-        BrokenPipeError: Who reads the result has gone.
-    """
+    """Outcome of a call; raises what is no expected error, and BrokenPipeError if who reads the result has gone."""
     try:
         return Outcome(call())
     except BrokenPipeError:

@@ -29,11 +29,7 @@ _VERSION = ('etag', 'md5', 'md5hash', 'contentmd5', 'crc32c', 'checksum', 'mtime
 
 
 def place_of(text: str) -> Place:
-    """What a text names: a URL, or a path; ``file://`` is a path.
-
-    Raises:
-        ValueError: It is a ``file://`` of another computer.
-    """
+    """What a text names: a URL, or a path; ``file://`` is a path. ValueError if it is that of another computer."""
     if not _URL.fullmatch(text):
         return Path(text)
     parts = urlsplit(text)
@@ -52,13 +48,17 @@ def name_of(place: Place) -> str:
     return path.name if path.is_dir() else path.stem
 
 
+def with_name(place: Place, error: str) -> str:
+    """An error that names the place."""
+    return error if str(place) in error else f'{place}: {error}'
+
+
 @contextmanager
 def as_path(place: Place) -> Iterator[Path]:
     """Path of a file or bag, in the block; of a URL a copy, which is removed after the block.
 
-    Raises:
-        MissingPackageError: fsspec is not installed.
-        ValueError: The URL cannot be read; one line that names it. Errors of the block name it, too, and not the copy.
+    Raises MissingPackageError without fsspec; ValueError, in one line that names it, if the URL cannot be read. Errors
+    of the block name it, too, and not the copy.
     """
     if isinstance(place, Path):
         yield place
@@ -74,9 +74,7 @@ def as_path(place: Place) -> Iterator[Path]:
 def url_digest(url: str) -> str:
     """Digest of what tells that the files of a URL have changed: as their store lists them, else their content.
 
-    Raises:
-        MissingPackageError: fsspec is not installed.
-        ValueError: The URL cannot be read; one line that names it.
+    Raises as `as_path`.
     """
     with _as_one_line(url):
         system, _, files = _listed(url)

@@ -1,8 +1,9 @@
 """Progress of long-running work: a bar on stderr, or a report to the parent process."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from typing import TypeVar
 
 from seal_friction_ros.offline.work.status import show_status
 
@@ -14,6 +15,7 @@ except ModuleNotFoundError:
 else:
     HAS_BAR = True
 
+Item = TypeVar('Item')
 _SMALLEST_SHARE = 0.01  # of a call: a worker process reports no smaller progress (our choice)
 _REFRESH_PERIOD = 0.1  # [s]
 
@@ -65,6 +67,14 @@ def progress(label: str, total: int | None) -> Iterator[Callable[[float], None]]
 
         yield advance
     show_status('...')
+
+
+def counted(items: Iterable[Item], advance: Callable[[float], None]) -> Iterator[Item]:
+    """The items as they are; calls ``advance`` after each thousand of them."""
+    for count, item in enumerate(items, start=1):
+        if count % 1000 == 0:
+            advance(1000)
+        yield item
 
 
 def _shares(total: int | None, report: Callable[[float], None]) -> Callable[[float], None]:

@@ -25,11 +25,7 @@ class ListedSeal(NamedTuple):
 
 
 def listed_seals(folders: Sequence[Path] = ()) -> list[ListedSeal]:
-    """Every seal file of the folders, sorted by name; without folders, of ``config/seals``.
-
-    Raises:
-        ValueError: A folder has no YAML file.
-    """
+    """Every seal file of some folders, or of ``config/seals``, sorted by name. ValueError if a folder has none."""
     if not folders:
         return [_listed(name, config_path('seals', name)) for name in config_names('seals')]
     found = []
@@ -47,12 +43,8 @@ def _listed(name: str, path: Path) -> ListedSeal:
         seal = parse_seal(document)
     except ValueError as error:
         return ListedSeal(name, error=str(error))
-    return ListedSeal(name, _law(seal), _range(seal), ' '.join(str(document.get('source', '')).split()))
-
-
-def _law(seal: Seal) -> str:
-    terms = ' with velocity terms' if seal.velocity_terms else ''
-    return f'{seal.coulomb_law.NAME}{terms}'
+    law = seal.coulomb_law.NAME + (' with velocity terms' if seal.velocity_terms else '')
+    return ListedSeal(name, law, _range(seal), ' '.join(str(document.get('source', '')).split()))
 
 
 def _range(seal: Seal) -> str:

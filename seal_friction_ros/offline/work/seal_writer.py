@@ -6,6 +6,7 @@ from typing import Any
 
 import yaml
 
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.files import parse_yaml
 from seal_friction_ros.offline.work.atomic_file import write_whole
@@ -23,20 +24,12 @@ def seal_text(document: Mapping[str, Any]) -> str:
 
 
 def write_seal(document: Mapping[str, Any], out: Path, comment: str = '') -> None:
-    """Write a seal file, and its folder if necessary; replace an existing file.
+    """Write a seal file with comment lines at its beginning, and its folder if necessary; replace an existing file.
 
-    Args:
-        document: The seal.
-        out: The file.
-        comment: Comment lines at its beginning.
-
-    Raises:
-        ValueError: The document is not a valid seal, or the file cannot be written.
+    ValueError: the document is not a valid seal, or the file cannot be written.
     """
     content = (''.join(f'# {line}\n' for line in comment.splitlines()) + seal_text(document)).encode()
     parse_seal(parse_yaml(content, str(out)))
-    try:
+    with named_errors(f'{out}: cannot write the seal file', OSError):
         out.parent.mkdir(parents=True, exist_ok=True)
         write_whole(out, content)
-    except OSError as error:
-        raise ValueError(f'{out}: cannot write the seal file: {error.strerror}') from None

@@ -11,11 +11,7 @@ _CLEAR = '\r\x1b[K'
 
 
 def show_status(text: str) -> None:
-    """Show what is being done, in place of what was shown before; nothing if stderr is no terminal.
-
-    Args:
-        text: One line; empty to remove the line, before anything else is printed.
-    """
+    """Show in one line what is being done, in place of the line before; only on a terminal."""
     if sys.stderr.isatty():
         sys.stderr.write(f'{_CLEAR}{text}')
         sys.stderr.flush()

@@ -44,18 +44,10 @@ def mark(command: str) -> str:
 def checked_targets(
     command: str, targets: Sequence[tuple[Path, Kind]], inputs: Sequence[Path], *, force: bool
 ) -> Iterator[None]:
-    """Run the block if it may write the targets.
+    """Run the block if it may write the targets; ValueError, in one line that says why, if it may not.
 
-    With ``force``, an existing bag or data sheet is set aside, and comes back if the block does not write another one.
-
-    Args:
-        command: Name of the command.
-        targets: What the block writes.
-        inputs: Files and folders that it reads; those that do not exist are ignored.
-        force: Overwrite what the command did not make.
-
-    Raises:
-        ValueError: A target may not be written; one line that says why.
+    With ``force``, it may overwrite what the command did not make; an existing bag or data sheet is set aside, and
+    comes back if the block does not write another one. Inputs that do not exist are ignored.
     """
     sources = [path.resolve() for path in inputs if path.exists()]
     for path, kind in targets:
@@ -96,16 +88,11 @@ def _check(target: Path, kind: Kind, inputs: Sequence[Path], command: str, *, fo
         if any(each == resolved or each in part_of or resolved in each.parents for each in inputs):
             raise ValueError(f'{path} belongs to an input: not overwriting it: choose another name')
         if path.is_dir() != is_folder or (kind is BAG and not (path / 'metadata.yaml').is_file()):
-            raise ValueError(f'{path} exists already and is {_what(path)}: not overwriting it: choose another name')
+            what = 'a folder but no bag' if path.is_dir() else 'no folder'
+            raise ValueError(f'{path} exists already and is {what}: not overwriting it: choose another name')
         if not is_own and not force:
-            raise ValueError(
-                f'{path} exists already: not overwriting it, seal_friction {command} did not make it: choose another '
-                'name, or give --force'
-            )
-
-
-def _what(path: Path) -> str:
-    return 'a folder but no bag' if path.is_dir() else 'no folder'
+            what = f'not overwriting it, seal_friction {command} did not make it'
+            raise ValueError(f'{path} exists already: {what}: choose another name, or give --force')
 
 
 def _has_mark(path: Path, command: str) -> bool:

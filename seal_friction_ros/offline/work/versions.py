@@ -22,11 +22,13 @@ def versions() -> Mapping[str, str]:
         digest.update(f'{source.relative_to(_PACKAGE.parent)} '.encode() + source.read_bytes())
     own = f'{package_version()} (source {digest.hexdigest()[:12]})'
     major, minor, _ = platform.python_version_tuple()
-    return {'seal_friction_ros': own, 'Python': f'{major}.{minor}', **{name: _version(name) for name in _LIBRARIES}}
+    libraries = {name: version_of(name, 'none') for name in _LIBRARIES}
+    return {'seal_friction_ros': own, 'Python': f'{major}.{minor}', **libraries}
 
 
-def _version(library: str) -> str:
+def version_of(package: str, absent: str) -> str:
+    """Version of an installed distribution, or ``absent``."""
     try:
-        return version(library)
+        return version(package)
     except PackageNotFoundError:
-        return 'none'
+        return absent

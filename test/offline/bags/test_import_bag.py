@@ -14,7 +14,8 @@ from rosbags.rosbag2 import StoragePlugin
 from seal_friction_ros.core.messages.coder import decode
 from seal_friction_ros.core.messages.layouts import INPUTS
 from seal_friction_ros.offline.bags.bag import BagError, BagWriter, read_messages
-from seal_friction_ros.offline.bags.import_bag import import_bag
+from seal_friction_ros.offline.bags.import_bag import convert_bag
+from seal_friction_ros.offline.bags.mapped_bag import read_mapping
 from seal_friction_ros.offline.commands.main import main
 
 
@@ -43,7 +44,7 @@ def signals(bag):
 @pytest.mark.parametrize('storage', [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
 def test_the_signals_are_those_of_the_machine(tmp_path, source, storage):
     foreign = write_standard(source, tmp_path / 'foreign', storage)
-    found = import_bag(foreign, mapping_file(tmp_path), tmp_path / 'imported')
+    found = convert_bag(foreign, tmp_path / 'imported', read_mapping(mapping_file(tmp_path)))
     assert found['axis'].remarks == ()
     expected, imported = signals(source), signals(tmp_path / 'imported')
     assert imported.keys() == expected.keys()
@@ -57,7 +58,7 @@ def test_the_signals_are_those_of_the_machine(tmp_path, source, storage):
 
 def test_stamps_of_a_simulation_keep_their_own_clock(tmp_path, source):
     foreign = write_standard(source, tmp_path / 'foreign', clock_offset=-1_700_000_000_000_000_000)
-    import_bag(foreign, mapping_file(tmp_path), tmp_path / 'imported')
+    convert_bag(foreign, tmp_path / 'imported', read_mapping(mapping_file(tmp_path)))
     assert main(['replay', str(tmp_path / 'imported'), '--out', str(tmp_path / 'replayed')]) == 0
     kinds = 'seal_friction_msgs/msg/FrictionEstimate'
     estimates = [decode(kinds, m.data) for m in read_messages(tmp_path / 'replayed') if m.type_name == kinds]
@@ -95,24 +96,24 @@ def test_an_imported_bag_is_tuned_identified_and_replayed(tmp_path, source, caps
 def test_a_mapping_that_does_not_fit_is_refused_and_leaves_nothing(tmp_path, source, change, error):
     foreign = write_standard(source, tmp_path / 'foreign')
     with pytest.raises(ValueError, match=error):
-        import_bag(foreign, mapping_file(tmp_path, change), tmp_path / 'imported')
+        convert_bag(foreign, tmp_path / 'imported', read_mapping(mapping_file(tmp_path, change)))
     assert not (tmp_path / 'imported').exists()
 
 
 def test_a_bag_of_other_topics_is_refused(tmp_path, source):
     with pytest.raises(ValueError, match='none of the topics'):
-        import_bag(source, mapping_file(tmp_path), tmp_path / 'imported')
+        convert_bag(source, tmp_path / 'imported', read_mapping(mapping_file(tmp_path)))
     with pytest.raises(BagError):
-        import_bag(tmp_path / 'nothing', mapping_file(tmp_path), tmp_path / 'imported')
+        convert_bag(tmp_path / 'nothing', tmp_path / 'imported', read_mapping(mapping_file(tmp_path)))
 
 
 def test_gauge_taken_for_absolute_and_the_reverse_are_said(tmp_path, source):
     foreign = write_standard(source, tmp_path / 'foreign')
     wrong = mapping_file(tmp_path, ('pressure_a: /p_a\n', 'pressure_a: {topic: /p_a, absolute: false}\n'))
-    (remark,) = import_bag(foreign, wrong, tmp_path / 'as_gauge')['axis'].remarks
+    (remark,) = convert_bag(foreign, tmp_path / 'as_gauge', read_mapping(wrong))['axis'].remarks
     assert 'write absolute: true' in remark
     gauge = mapping_file(tmp_path, ('pressure_a: /p_a\n', 'pressure_a: {topic: /p_a, offset: -200 bar}\n'))
-    (remark,) = import_bag(foreign, gauge, tmp_path / 'below')['axis'].remarks
+    (remark,) = convert_bag(foreign, tmp_path / 'below', read_mapping(gauge))['axis'].remarks
     assert 'write absolute: false' in remark
 
 
@@ -134,8 +135,8 @@ def test_stamps_that_jump_are_repaired_and_said_by_import_info_and_identify(tmp_
     count = len(list(read_messages(foreign)))
     late = damaged(foreign, tmp_path / 'jump', lambda i, m: stamped_ahead(m, 3600 if i < count // 2 else 0))
     mapping = mapping_file(tmp_path)
-    import_bag(foreign, mapping, tmp_path / 'as_it_was')
-    found = import_bag(late, mapping, tmp_path / 'imported')['axis']
+    convert_bag(foreign, tmp_path / 'as_it_was', read_mapping(mapping))
+    found = convert_bag(late, tmp_path / 'imported', read_mapping(mapping))['axis']
     assert sum('jumps 1 times' in remark for remark in found.remarks) >= 3
     for kind, records in signals(tmp_path / 'imported').items():
         stamps = [record.stamp for record in records]
@@ -152,7 +153,7 @@ def test_a_short_message_is_left_out_and_counted(tmp_path, source, capsys):
     foreign = write_standard(source, tmp_path / 'foreign')
     place = [number for number, message in enumerate(read_messages(foreign)) if message.topic == '/p_a'][100]
     short = damaged(foreign, tmp_path / 'short', lambda number, m: m.data[:7] if number == place else m.data)
-    found = import_bag(short, mapping_file(tmp_path), tmp_path / 'imported')['axis']
+    found = convert_bag(short, tmp_path / 'imported', read_mapping(mapping_file(tmp_path)))['axis']
     (remark,) = found.remarks
     assert remark.startswith('/p_a: ')
     assert remark.endswith('(1 messages)')
@@ -167,7 +168,9 @@ def test_the_tracking_error_is_that_of_positions_and_references_of_the_same_time
         given['seal_friction_msgs/msg/ServoReference'], given['seal_friction_msgs/msg/RodPosition'], strict=True
     )
     expected = math.sqrt(fmean((wanted.position - measured.position) ** 2 for wanted, measured in pairs))
-    found = import_bag(write_standard(source, tmp_path / 'foreign'), mapping_file(tmp_path), tmp_path / 'imported')
+    found = convert_bag(
+        write_standard(source, tmp_path / 'foreign'), tmp_path / 'imported', read_mapping(mapping_file(tmp_path))
+    )
     assert found['axis'].tracking_rms == pytest.approx(expected, rel=1e-3)
 
 
@@ -180,7 +183,7 @@ def test_a_recording_that_hears_its_pressures_last_begins_with_the_first_one(tmp
                 writer.write(*message)
         for message in messages[len(messages) // 10 :]:
             writer.write(*message)
-    counts = import_bag(late, mapping_file(tmp_path), tmp_path / 'imported')['axis'].messages
+    counts = convert_bag(late, tmp_path / 'imported', read_mapping(mapping_file(tmp_path)))['axis'].messages
     assert counts['/rod_velocity'] == 900
     kinds = [message.topic for message in read_messages(tmp_path / 'imported')]
     assert kinds.index('/cylinder_pressure') < kinds.index('/rod_velocity')
@@ -189,14 +192,14 @@ def test_a_recording_that_hears_its_pressures_last_begins_with_the_first_one(tmp
 def test_a_topic_of_no_actuator_is_copied_on_request_and_an_absent_one_is_refused(tmp_path, source):
     foreign = write_standard(source, tmp_path / 'foreign')
     mapping = mapping_file(tmp_path)
-    import_bag(foreign, mapping, tmp_path / 'imported', ('/set',))
+    convert_bag(foreign, tmp_path / 'imported', read_mapping(mapping), ('/set',))
     copied, given = (
         [bytes(message.data) for message in read_messages(bag) if message.topic == '/set']
         for bag in (tmp_path / 'imported', foreign)
     )
     assert copied == given != []
     with pytest.raises(ValueError, match='/command is not in it'):
-        import_bag(foreign, mapping, tmp_path / 'again', ('/command',))
+        convert_bag(foreign, tmp_path / 'again', read_mapping(mapping), ('/command',))
     assert not (tmp_path / 'again').exists()
 
 
@@ -205,6 +208,6 @@ def test_several_actuators_get_a_bag_each(tmp_path, source):
     mapping = mapping_file(tmp_path)
     text = MAPPING + MAPPING.partition('actuators:\n')[2].replace('  axis:', '  twin:')
     (tmp_path / 'robot.yaml').write_text(text)
-    found = import_bag(foreign, mapping, tmp_path / 'imported')
+    found = convert_bag(foreign, tmp_path / 'imported', read_mapping(mapping))
     assert [one.bag for one in found.values()] == [tmp_path / 'imported' / 'axis', tmp_path / 'imported' / 'twin']
     assert signals(found['axis'].bag) == signals(found['twin'].bag)

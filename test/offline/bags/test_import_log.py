@@ -29,7 +29,7 @@ from seal_friction_ros.offline.bags.bag import (
     BagError,
     read_messages,
 )
-from seal_friction_ros.offline.bags.import_log import import_log
+from seal_friction_ros.offline.bags.import_log import convert_log
 from seal_friction_ros.offline.bags.rig_file import read_rig
 
 DATA = ROOT.parent / 'shared' / 'data'
@@ -65,7 +65,7 @@ def imported(tmp_path, log, rig=RIG):
     log_path, rig_path, out = tmp_path / 'log.csv', tmp_path / 'rig.yaml', tmp_path / 'bag'
     log_path.write_bytes(log if isinstance(log, bytes) else log.encode())
     rig_path.write_text(yaml.safe_dump(rig))
-    return import_log(log_path, rig_path, out), out
+    return convert_log(log_path, out, read_rig(rig_path)), out
 
 
 def signals(bag):
@@ -527,7 +527,7 @@ def test_missing_files_and_an_existing_bag(tmp_path):
     rig, log, out = tmp_path / 'rig.yaml', tmp_path / 'log.csv', tmp_path / 'other'
     for bad_log, bad_rig in ((tmp_path / 'none', rig), (tmp_path, rig), (log, tmp_path / 'none')):
         with pytest.raises(ValueError, match=r'No such file|Is a directory'):
-            import_log(bad_log, bad_rig, out)
+            convert_log(bad_log, out, read_rig(bad_rig))
         assert not out.exists()
 
 
@@ -554,7 +554,7 @@ def delft_friction(bag):
 @pytest.mark.parametrize(('ring', 'bar'), [(ring, bar) for ring, of_bar in DELFT_FRICTION.items() for bar in of_bar])
 def test_delft_half_range_is_the_friction(tmp_path, ring, bar):
     log = data(f'delft/{ring}_{bar}bar.csv')
-    summary = import_log(log, config_path('rigs', 'delft'), tmp_path / 'bag')
+    summary = convert_log(log, tmp_path / 'bag', read_rig(config_path('rigs', 'delft')))
     lines = len(log.read_text().split('\n')) - 1
     assert summary.rows == lines - 15
     assert summary.not_finite == 0
@@ -568,7 +568,7 @@ def test_delft_half_range_is_the_friction(tmp_path, ring, bar):
 def test_delft_pressure_extends(tmp_path):
     """The load cell pushes harder while the pressurised chamber gets smaller: its pressure is the one that extends."""
     log = data('delft/O-ring257_7bar.csv')
-    import_log(log, config_path('rigs', 'delft'), tmp_path / 'bag')
+    convert_log(log, tmp_path / 'bag', read_rig(config_path('rigs', 'delft')))
     table = np.loadtxt(log)[15:]
     velocity = signals(tmp_path / 'bag')[4]
     load = table[:, 6]
@@ -584,7 +584,7 @@ def test_delft_rig_file_has_the_bore():
 @pytest.mark.parametrize('name', ['FrictionIDMovesWithBiasCurr', '2022.01.28T16.46.31_new'])
 def test_mbari_signs(tmp_path, name):
     log = data(f'mbari/{name}.exp')
-    summary = import_log(log, config_path('rigs', 'mbari'), tmp_path / 'bag')
+    summary = convert_log(log, tmp_path / 'bag', read_rig(config_path('rigs', 'mbari')))
     stamp, chamber_a, chamber_b, force, velocity = signals(tmp_path / 'bag')
     table = np.loadtxt(log)
     assert summary.rows == len(table)
@@ -604,7 +604,7 @@ def mbari_table(velocity):
 
 @pytest.mark.parametrize(('name', 'rms'), [('FrictionIDMovesWithBiasCurr', 197), ('2022.01.28T16.46.31_new', 504)])
 def test_mbari_force_sum_is_the_friction_known_from_outside(tmp_path, name, rms):
-    import_log(data(f'mbari/{name}.exp'), config_path('rigs', 'mbari'), tmp_path / 'bag')
+    convert_log(data(f'mbari/{name}.exp'), tmp_path / 'bag', read_rig(config_path('rigs', 'mbari')))
     stamp, _, _, force, velocity = signals(tmp_path / 'bag')
     acceleration = np.gradient(velocity, stamp * 1e-9)
     chosen = (np.abs(velocity) > 0.01) & (np.abs(acceleration) < 0.05)
@@ -645,7 +645,7 @@ def test_delft_seal_file_covers_the_pressures_of_the_runs(tmp_path):
     seal = parse_seal(read_yaml(config_path('seals', 'delft_o_ring')))
     for bar in DELFT_FRICTION['O-ring257']:
         bag = tmp_path / f'{bar}'
-        import_log(data(f'delft/O-ring257_{bar}bar.csv'), config_path('rigs', 'delft'), bag)
+        convert_log(data(f'delft/O-ring257_{bar}bar.csv'), bag, read_rig(config_path('rigs', 'delft')))
         chamber_a = signals(bag)[1]
         assert seal.pressure_min < chamber_a.min()
         assert chamber_a.max() < seal.pressure_max

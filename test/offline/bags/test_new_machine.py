@@ -17,7 +17,8 @@ from seal_friction_ros.core.messages.definitions import parse_definition
 from seal_friction_ros.core.messages.records import Position
 from seal_friction_ros.files import config_path, machine_configurations, read_machine
 from seal_friction_ros.offline.bags.bag import BagError, BagWriter, read_messages
-from seal_friction_ros.offline.bags.import_bag import import_bag
+from seal_friction_ros.offline.bags.import_bag import convert_bag
+from seal_friction_ros.offline.bags.mapped_bag import read_mapping
 from seal_friction_ros.offline.bags.new_machine import new_machine
 from seal_friction_ros.offline.commands.main import main
 
@@ -45,7 +46,7 @@ def test_the_mapping_that_is_written_imports_the_bag(tmp_path, source, storage):
     text = out.read_text()
     assert 'bore: 40 mm  # missing' in text
     assert text.count('Pa: absolute') == 2
-    assert import_bag(foreign, str(out), tmp_path / 'imported')['axis'].messages['/rod_velocity'] == 300
+    assert convert_bag(foreign, tmp_path / 'imported', read_mapping(str(out)))['axis'].messages['/rod_velocity'] == 300
 
 
 def test_candidates_for_what_is_missing_are_listed_with_topic_element_and_range(tmp_path, source):

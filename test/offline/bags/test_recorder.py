@@ -378,7 +378,7 @@ def test_the_disk_is_never_asked_for_its_space_where_messages_are_recorded(tmp_p
 
 @pytest.mark.parametrize(('size', 'period', 'looks'), [(100_000, 1e9, 20), (10, 0.0, 20), (10, 1e9, 1)])
 def test_the_disk_is_asked_by_bytes_written_and_by_time(tmp_path: Path, monkeypatch, asked, size, period, looks):
-    monkeypatch.setattr(recorder_module, '_LOOK_PERIOD', period)
+    monkeypatch.setattr(recorder_module, 'LOOK_PERIOD', period)
     recorder = Recorder(tmp_path / 'bag', free_space=1)
     for number in range(20):
         recorder.record('/t', CONFIGURATION_TYPE, number, encode_text(str(number)) + bytes(size))

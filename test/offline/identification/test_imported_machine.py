@@ -9,7 +9,8 @@ from harness.identify_run import Run
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from seal_friction_ros.core.messages.records import Status
-from seal_friction_ros.offline.bags.import_bag import import_bag
+from seal_friction_ros.offline.bags.import_bag import convert_bag
+from seal_friction_ros.offline.bags.mapped_bag import read_mapping
 from seal_friction_ros.offline.bags.recorded_run import read_run
 from seal_friction_ros.offline.commands.main import main
 
@@ -61,7 +62,7 @@ def test_friction_and_load_are_those_of_the_machine(tmp_path, mapping):
     simulated = boom.simulate(Boom(), 'sines')
     foreign = write_boom(tmp_path / 'foreign', boom.measured(simulated, 0))
     (tmp_path / 'robot.yaml').write_text(mapping)
-    import_bag(foreign, str(tmp_path / 'robot.yaml'), tmp_path / 'boom')
+    convert_bag(foreign, tmp_path / 'boom', read_mapping(str(tmp_path / 'robot.yaml')))
     run = Run(tmp_path, str(tmp_path / 'boom'))
     assert run.code == 0, run.errors
     true = np.abs(simulated.friction[np.abs(simulated.velocity) > 5e-3]).mean()
@@ -74,7 +75,7 @@ def test_friction_and_load_are_those_of_the_machine(tmp_path, mapping):
 def test_at_rest_the_unknown_load_is_flagged_and_never_called_friction(tmp_path):
     foreign = write_boom(tmp_path / 'foreign', boom.measured(boom.simulate(Boom(), 'single'), 0))
     (tmp_path / 'robot.yaml').write_text(MAPPING)
-    import_bag(foreign, str(tmp_path / 'robot.yaml'), tmp_path / 'boom')
+    convert_bag(foreign, tmp_path / 'boom', read_mapping(str(tmp_path / 'robot.yaml')))
     assert main(['replay', str(tmp_path / 'boom'), '--out', str(tmp_path / 'replayed')]) == 0
     run = read_run(tmp_path / 'replayed')
     rest = run.direction == 0

@@ -14,7 +14,7 @@ from seal_friction_ros.core.messages.records import Status
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.bags.actuator_bag import find_topics
 from seal_friction_ros.offline.bags.bag import BagWriter, read_messages
-from seal_friction_ros.offline.bags.import_log import import_log, read_samples
+from seal_friction_ros.offline.bags.import_log import convert_log, read_samples
 from seal_friction_ros.offline.bags.rig_file import read_rig
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.replay.compiled_replay import replay_in_bulk
@@ -106,7 +106,7 @@ def test_the_column_goes_into_the_bag_and_identify_finds_the_same_coefficient_th
     from_logs, _ = identified(logs, 'with.yaml', tmp_path / 'logs.yaml', capsys)
     names = [f'{celsius:.0f}' for celsius in CELSIUS]
     for name in names:
-        import_log(logs / f'{name}.csv', logs / 'with.yaml', tmp_path / name)
+        convert_log(logs / f'{name}.csv', tmp_path / name, read_rig(logs / 'with.yaml'))
     bags = [str(tmp_path / name) for name in names]
     assert main(['identify', *bags, '--seal-chambers', 'a', '--out', str(tmp_path / 'bags.yaml')]) == 0
     capsys.readouterr()
@@ -120,7 +120,7 @@ def test_a_bag_with_a_seal_file_of_that_kind_replays_at_its_temperature(logs, tm
     identified(logs, 'with.yaml', tmp_path / 'seal.yaml', capsys)
     friction = {}
     for name in ('15', '55'):
-        import_log(logs / f'{name}.csv', logs / 'with.yaml', tmp_path / name)
+        convert_log(logs / f'{name}.csv', tmp_path / name, read_rig(logs / 'with.yaml'))
         override = chosen_configuration(None, tmp_path / 'seal.yaml')
         replay(tmp_path / name, override, tmp_path / f'{name}_replayed')
         estimates = [
@@ -144,7 +144,7 @@ def verdict(bag):
 
 
 def test_of_several_topics_of_the_type_that_with_the_name_is_meant(logs, tmp_path):
-    import_log(logs / '25.csv', logs / 'with.yaml', tmp_path / 'one')
+    convert_log(logs / '25.csv', tmp_path / 'one', read_rig(logs / 'with.yaml'))
     messages = list(read_messages(tmp_path / 'one'))
     with BagWriter(tmp_path / 'two') as writer, BagWriter(tmp_path / 'foreign') as foreign:
         for message in messages:

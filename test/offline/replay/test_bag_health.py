@@ -15,7 +15,8 @@ from seal_friction_ros.core.friction.seal_file import mount_seals
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.replay.bag_health import bag_health, health_of_bags
-from seal_friction_ros.offline.replay.compiled_replay import compile_now, first_configurations
+from seal_friction_ros.offline.replay.bag_parts import Chosen
+from seal_friction_ros.offline.replay.compiled_replay import compile_first
 from seal_friction_ros.offline.replay.parallel_replay import verify
 from seal_friction_ros.offline.replay.replay import chosen_configuration
 
@@ -108,6 +109,6 @@ def test_bags_are_followed_in_parallel_as_one_by_one_by_code_that_is_compiled_be
     for one, other in zip(alone, together, strict=True):
         np.testing.assert_equal(one[:7], other[:7])
     with event.install_recorder('numba:compile') as compilations:
-        compile_now(first_configurations(week, '', override))
+        compile_first(week, Chosen(override=override))
         bag_health(week[0], '', override)
     assert not compilations.buffer

@@ -75,12 +75,12 @@ def test_participants_are_counted_by_their_ports_in_the_domain():
 
 
 def test_a_small_shared_memory_is_noted(monkeypatch, tmp_path: Path):
-    monkeypatch.setattr(computer, '_SHARED_MEMORY', tmp_path)
+    monkeypatch.setattr(computer, 'SHARED_MEMORY', tmp_path)
     (tmp_path / 'fastrtps_1').touch()
     level, text = about('shared memory', {'ROS_DISTRO': 'jazzy'})
     assert level is Level.OK
     assert text.endswith(' MiB free, 1 files of Fast DDS')
-    monkeypatch.setattr(computer, '_SMALLEST_SHARED_MEMORY', 1 << 62)
+    monkeypatch.setattr(computer, 'SMALLEST_SHARED_MEMORY', 1 << 62)
     assert about('shared memory', {'ROS_DISTRO': 'jazzy'})[0] is Level.NOTE
     assert 'not used' in about('shared memory', {})[1]
 

@@ -69,7 +69,7 @@ def test_every_command_takes_the_bag_of_a_url_as_it_takes_a_path(memory, tmp_pat
 @pytest.mark.parametrize('is_quick', [True, pytest.param(False, marks=pytest.mark.long)])
 def test_the_list_of_a_fleet_takes_urls_each_once(memory, tmp_path, capsys, monkeypatch, is_quick):
     if is_quick:  # what is computed takes the compiler
-        monkeypatch.setattr(bag_summary, 'compile_now', lambda _: None)
+        monkeypatch.setattr(bag_summary, 'compile_first', lambda *_: None)
         monkeypatch.setattr(bag_summary, 'bag_summary', no_summary)
     (tmp_path / 'list').write_text(f'{memory}\n{memory}\nmemory://store/gone\n')
     assert main(['fleet', str(tmp_path / 'list'), '--out', str(tmp_path / 'fleet.html'), '--json']) == 2
