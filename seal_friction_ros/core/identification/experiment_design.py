@@ -26,7 +26,7 @@ from seal_friction_ros.core.identification.candidate_laws import (
     with_velocity_terms,
 )
 from seal_friction_ros.core.identification.diagnostics import CorrelatedPair
-from seal_friction_ros.core.identification.fitting import LawFit
+from seal_friction_ros.core.identification.fitting import LawFit, slopes
 from seal_friction_ros.core.identification.readings import FrictionReadings, are_far_apart
 from seal_friction_ros.core.identification.runs import PRIOR_FREEDOM, BetweenRuns
 from seal_friction_ros.core.identification.selection import LawScore, is_beaten, losses_of, mean_loss
@@ -130,7 +130,6 @@ class _Model:
 
     law: CandidateLaw
     values: ParameterValues
-    steps: FloatArray  # of the differences, shape (parameters,)
     seals: int
     mean: float  # [N] mean friction of the readings
     held_scale: float  # [N] divisor of a deviation; NaN if it is the friction
@@ -140,14 +139,8 @@ class _Model:
         return np.maximum(self.law.friction(at, self.values), 0.05 * self.mean)
 
     def slopes(self, at: OperatingConditions) -> FloatArray:
-        """Derivative of the friction [N] by each parameter, by forward differences, shape (n, parameters)."""
-        base = self.law.friction(at, self.values)
-        columns = []
-        for parameter, size in zip(self.law.parameters, self.steps.tolist(), strict=True):
-            value = self.values[parameter.name]
-            step = size if value + size <= parameter.upper else -size
-            columns.append((self.law.friction(at, {**self.values, parameter.name: value + step}) - base) / step)
-        return np.column_stack(columns)
+        """Derivative of the friction [N] by each parameter, shape (n, parameters)."""
+        return slopes(self.law, self.values, at)
 
     def scale(self, at: OperatingConditions) -> FloatArray:
         """Divisor of the deviation of a new reading [N], as of `FrictionReadings.scale`; of pairs of directions."""
@@ -212,14 +205,14 @@ def design_experiment(
     identified, pressures = _pressure_ranges(readings)
     speeds = _grid_speeds(used_speeds)
     prior = _prior(model, *pressures, speeds)
-    slopes = model.slopes(at)
-    weighted = _without_offsets(slopes, readings) / scatter
+    at_readings = model.slopes(at)
+    weighted = _without_offsets(at_readings, readings) / scatter
     worth = _readings_worth_one(chosen, readings, scatter)
     had = weighted.T @ weighted / worth
 
     range_slopes = _relative_slopes(model, pressures, speeds)
-    at_readings = slopes / model.friction(at)[:, np.newaxis]
-    identified_slopes = _relative_slopes(model, identified, used_speeds) if is_varied else at_readings
+    relative = at_readings / model.friction(at)[:, np.newaxis]
+    identified_slopes = _relative_slopes(model, identified, used_speeds) if is_varied else relative
     before = _error(range_slopes, had + prior)
     law_error = _error(identified_slopes, had + prior)
     parts = {RUN_TO_RUN: of_band, LAW: law_error, SCATTER: scatter}
@@ -314,10 +307,8 @@ def _model(score: LawScore, readings: FrictionReadings, at: OperatingConditions)
         law = with_velocity_terms(law, Variation(asymmetry=False))[0]
         values['viscous_friction'] = 0.0
     mean = float(score.fit.friction(readings.at).mean()) if score.fit else math.nan
-    typical = at.typical(mean / at.pressure.shape[1])
-    sizes = [max(abs(values[p.name]), 1e-3 * abs(p.start(typical)), 1e-12) for p in law.parameters]
     scale = float(readings.scale[0]) if readings.are_samples else math.nan
-    return _Model(law, values, 1e-4 * np.array(sizes), at.pressure.shape[1], mean, scale)
+    return _Model(law, values, at.pressure.shape[1], mean, scale)
 
 
 def _scatter(score: LawScore, readings: FrictionReadings) -> float:

@@ -103,6 +103,16 @@ class ModelFit:
         return np.asarray(self.vector[1 : 1 + len(self.columns)] * self.size)
 
     @property
+    def division(self) -> FloatArray:
+        """Share of each kind in the friction that no pressure divides [-], shape (kinds,): that of the rising parts.
+
+        A seal that is pressed harder at no pressure gains more by pressure, too: our choice. Without any rise, each
+        seal has the same.
+        """
+        parts = self.parts if self.parts.sum() > 0.0 else np.array([float(len(each)) for each in self.columns])
+        return np.asarray(parts / parts.sum())
+
+    @property
     def areas(self) -> FloatArray:
         """Error of the areas of chambers a and b in the force sum [m^2], shape (2,)."""
         first = _Layout(len(self.columns), 0).asymmetry + 1

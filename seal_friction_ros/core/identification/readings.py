@@ -13,7 +13,7 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.foundation.units import BAR
-from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
+from seal_friction_ros.core.identification.candidate_laws import OperatingConditions, SealKind
 from seal_friction_ros.core.identification.signal_preparation import (
     LONGEST_GAP,
     HalfRange,
@@ -82,6 +82,9 @@ class FrictionReadings:
     """[s] time at rest before each breakaway, shape (n,); empty if unknown"""
     temperature: FloatArray = field(default_factory=lambda: np.empty(0))
     """[K] of each reading, shape (n,); empty if unknown"""
+    chamber_pressures: FloatArray = field(default_factory=lambda: np.empty(0))
+    """[Pa] of chambers a and b, shape (n, 2); empty for one kind of seals"""
+    kinds: tuple[SealKind, ...] = ()  # of the seals, in the order of the pressures; empty: one kind
     free_rod: FreeRod | None = None  # if the pressures are the effect of the friction, and tell nothing of it
 
     @property
@@ -123,6 +126,7 @@ class FrictionReadings:
             travel=self.travel[where] if len(self.travel) else self.travel,
             dwell=self.dwell[where] if len(self.dwell) else self.dwell,
             temperature=self.temperature[where] if len(self.temperature) else self.temperature,
+            chamber_pressures=self.chamber_pressures[where] if self.kinds else self.chamber_pressures,
         )
 
     @cached_property

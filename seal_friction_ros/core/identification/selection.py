@@ -170,7 +170,12 @@ class LawScore:
 def score_ladder(
     laws: Sequence[CandidateLaw], readings: FrictionReadings, variation: Variation, tick: Ticks = lambda _: None
 ) -> tuple[LawScore, ...]:
-    """Score every law, then the best law that depends on pressure again with velocity terms; from simple to complex."""
+    """Score every law, then the best law that depends on pressure again with velocity terms; from simple to complex.
+
+    Several kinds of seals have the law of all terms alone.
+    """
+    if readings.kinds:
+        return score_laws([law_of_all_terms(variation, readings.kinds)], readings, tick)
     scores = score_laws(laws, readings, tick)
     scored = [score for score in scores if score.losses is not None and score.law.depends_on_pressure]
     if not scored:

@@ -4,6 +4,8 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
+
 from seal_friction_ros.core.foundation.units import BAR, MM
 from seal_friction_ros.core.identification.experiment_design import (
     ASSUMED_SPEED,
@@ -13,6 +15,7 @@ from seal_friction_ros.core.identification.experiment_design import (
     ExperimentDesign,
     design_experiment,
 )
+from seal_friction_ros.core.identification.seal_kinds import moved_together, proposed_conditions
 from seal_friction_ros.offline.identification.data_sheet import FrictionTestPlan
 from seal_friction_ros.offline.identification.results import Identification, rounded_value
 
@@ -82,6 +85,26 @@ def numbers_of(design: ExperimentDesign) -> dict[str, Any]:
             'another_run': design.repeated and design.repeated._asdict(),
         },
     }
+
+
+def kinds_sheet(found: Identification) -> str:
+    """CSV of the chamber pressures to drive next, one row each, at the mean speed of the readings.
+
+    A log holds the readings of several kinds of seals, so the rows are driven while recording; nothing is filled in.
+    """
+    readings = found.data.used
+    conditions, correlation = proposed_conditions(readings, found.selection.fit.model)
+    before = float(moved_together(readings).max())
+    speed = float(np.nan_to_num(np.abs(readings.at.velocity)).mean()) / MM
+    lines = [
+        '# Next runs of a cylinder with several kinds of seals: hold both pressures, drive ten strokes in each',
+        '# direction, and record each row; then give these and all earlier logs to identify.',
+        f'# Correlation of the pressures of the kinds: {before:.2f} now, {min(correlation, before):.2f} with these.',
+    ]
+    if not conditions:
+        lines.append('# The pressures tell the kinds apart as well as this cylinder can: repeat runs on another day.')
+    rows = [f'{c.a / BAR:.6g},{c.b / BAR:.6g},{speed:.3g}' for c in conditions]
+    return '\n'.join([*lines, 'pressure_a_bar,pressure_b_bar,speed_mm_per_s', *rows]) + '\n'
 
 
 def _rounded(value: float) -> float | None:
