@@ -164,6 +164,27 @@ class FrictionReadings:
         friction, offset = np.average(np.array(found), axis=0, weights=weights)
         return HalfRange(float(friction), float(offset))
 
+    @cached_property
+    def offsets(self) -> FloatArray:
+        """Offset of the force sum of each source [N], in which friction cancels: mean over its pressures."""
+        found = np.zeros(len(self.names))
+        for source in np.unique(self.source):
+            parts = [inside & (self.source == source) for inside in self.levels.values()]
+            found[source] = np.mean([self.half_range(part).offset for part in parts if part.any()])
+        return found
+
+    def offsets_with_own(self, offsets: FloatArray, rest: FloatArray, known: IntArray) -> FloatArray:
+        """Offsets [N], shape (sources,), those of sources that are not ``known`` from the readings themselves.
+
+        ``rest`` is the force without friction [N], shape (n,); a source in one direction only has none.
+        """
+        found = offsets.copy()
+        for source in set(self.source.tolist()) - set(known.tolist()):
+            index = self.two_sided[source]
+            side = self.at.direction[index].astype(np.int64)
+            found[source] = half_range(rest[index], side, of_medians=False).offset if len(index) else 0.0
+        return found
+
     def frictions_of_sources(self, inside: BoolArray) -> dict[int, float]:
         """Source -> friction of its readings ``inside`` [N]."""
         sources = np.unique(self.source[inside])

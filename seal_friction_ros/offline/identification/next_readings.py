@@ -1,6 +1,5 @@
 """Next readings of an identification: the design, as a data sheet, as numbers for JSON, and in words."""
 
-import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -17,7 +16,8 @@ from seal_friction_ros.core.identification.experiment_design import (
 )
 from seal_friction_ros.core.identification.seal_kinds import moved_together, proposed_conditions
 from seal_friction_ros.offline.identification.data_sheet import FrictionTestPlan
-from seal_friction_ros.offline.identification.results import Identification, rounded_value
+from seal_friction_ros.offline.identification.results import Identification
+from seal_friction_ros.offline.work.seal_writer import rounded, rounded_numbers
 
 LIMITS = {
     RUN_TO_RUN: 'the spread from run to run',
@@ -37,7 +37,7 @@ def design_for(found: Identification) -> ExperimentDesign:
 
 def plan_of(found: Identification, design: ExperimentDesign) -> FrictionTestPlan:
     """Data sheet of the proposed readings, sorted by pressure and speed, in bar, mm/s and N."""
-    points = [(rounded_value(r.pressure / BAR), rounded_value(r.speed / MM)) for r in design.readings]
+    points = [(rounded(r.pressure / BAR, 6), rounded(r.speed / MM, 6)) for r in design.readings]
     name = str(found.document['name']).replace(',', ' ')
     ring = found.data.ring
     return FrictionTestPlan.at_points(
@@ -56,35 +56,38 @@ def plan_of(found: Identification, design: ExperimentDesign) -> FrictionTestPlan
 def numbers_of(design: ExperimentDesign) -> dict[str, Any]:
     """Numbers for JSON: ``next``, the readings in the order of their use, and ``next_effect``."""
     before, after = design.correlation_before, design.correlation_after
-    pair = before and after and {'parameters': [before.one, before.other], 'before': _rounded(before.correlation),
-                                 'after': _rounded(after.correlation)}  # fmt: skip
-    return {
-        'next': [
-            {
-                'pressure_Pa': rounded_value(r.pressure),
-                'speed_m_per_s': rounded_value(r.speed),
-                'directions': list(r.directions),
-                'shrink': _rounded(r.shrink),
-                'disagreement': _rounded(r.disagreement),
-                'is_repeated': r.is_repeated,
-            }
-            for r in design.readings
-        ],
-        'next_effect': {
-            'law': design.law.name,
-            'limit': design.limit,
-            'parts': {part: _rounded(value) for part, value in design.parts.items()},
-            'error_before': _rounded(design.error_before),
-            'error_after': _rounded(design.error_after),
-            'shrink': _rounded(design.shrink),
-            'pressures_Pa': [rounded_value(p) for p in design.pressures],
-            'speeds_m_per_s': [rounded_value(v) for v in design.speeds],
-            'correlation': pair,
-            'condition_number_before': _rounded(design.condition_before),
-            'condition_number_after': _rounded(design.condition_after),
-            'another_run': design.repeated and design.repeated._asdict(),
-        },
-    }
+    pair = before and after and {'parameters': [before.one, before.other], 'before': before.correlation,
+                                 'after': after.correlation}  # fmt: skip
+    numbers: dict[str, Any] = rounded_numbers(
+        {
+            'next': [
+                {
+                    'pressure_Pa': r.pressure,
+                    'speed_m_per_s': r.speed,
+                    'directions': r.directions,
+                    'shrink': r.shrink,
+                    'disagreement': r.disagreement,
+                    'is_repeated': r.is_repeated,
+                }
+                for r in design.readings
+            ],
+            'next_effect': {
+                'law': design.law.name,
+                'limit': design.limit,
+                'parts': design.parts,
+                'error_before': design.error_before,
+                'error_after': design.error_after,
+                'shrink': design.shrink,
+                'pressures_Pa': design.pressures,
+                'speeds_m_per_s': design.speeds,
+                'correlation': pair,
+                'condition_number_before': design.condition_before,
+                'condition_number_after': design.condition_after,
+            },
+        }
+    )
+    numbers['next_effect']['another_run'] = design.repeated and design.repeated._asdict()
+    return numbers
 
 
 def kinds_sheet(found: Identification) -> str:
@@ -105,10 +108,6 @@ def kinds_sheet(found: Identification) -> str:
         lines.append('# The pressures tell the kinds apart as well as this cylinder can: repeat runs on another day.')
     rows = [f'{c.a / BAR:.6g},{c.b / BAR:.6g},{speed:.3g}' for c in conditions]
     return '\n'.join([*lines, 'pressure_a_bar,pressure_b_bar,speed_mm_per_s', *rows]) + '\n'
-
-
-def _rounded(value: float) -> float | None:
-    return rounded_value(value) if math.isfinite(value) else None
 
 
 def _percent(share: float) -> str:

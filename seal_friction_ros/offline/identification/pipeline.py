@@ -49,9 +49,9 @@ from seal_friction_ros.core.identification.selection import (
     ChosenAnew,
     LawScore,
     LeftOut,
+    NotScored,
     choose_anew,
     collinear_spread,
-    mean_loss,
     recommended,
     rise_over_pressures,
     score_ladder,
@@ -70,7 +70,6 @@ from seal_friction_ros.offline.identification.results import (
     Ring,
     identification_section,
     kind_section,
-    rounded_value,
     seal_document,
 )
 from seal_friction_ros.offline.identification.sources import SourceOptions, Sources, read_sources
@@ -79,6 +78,7 @@ from seal_friction_ros.offline.work.executor import Workers
 from seal_friction_ros.offline.work.finished_parts import Part, content_of, part_key, run_parts
 from seal_friction_ros.offline.work.places import Place
 from seal_friction_ros.offline.work.progress import progress
+from seal_friction_ros.offline.work.seal_writer import rounded_numbers
 
 MOST_EXTENSIONS = 4  # of a law by velocity terms, and the law of all terms
 FEWEST_TO_COMPARE = 4  # pressures by which the settled seal is compared with the readings as measured (our choice)
@@ -250,7 +250,7 @@ def _ring(sources: Sources, options: IdentifyOptions) -> Ring | None:
     normal_force = document.get('normal_force')
     if not isinstance(normal_force, Mapping) or options.squeeze_force:
         gain = read_yaml(config_path('seals', REFERENCE_SEAL))['normal_force']['area_deformation_gain']
-        force = rounded_value(squeeze_force(geometry))
+        force = rounded_numbers(squeeze_force(geometry))
         normal_force = {'law': 'area_deformation_gain', 'area_deformation_gain': gain, 'radial_force': force}
     return Ring(geometry, parse_part(NormalForceLaw, {'normal_force': normal_force}, 'seal'))
 
@@ -303,15 +303,16 @@ def select_law(
     if settled is not None and len(data.used.levels) >= FEWEST_TO_COMPARE:
         of_settled = _scored(settled.readings, data.ring, data.sources.has_fitted_load)
         best_settled = recommended(of_settled, rise_over_pressures(settled.readings))
-        if mean_loss(best_settled) <= (1.0 + WORTHWHILE) * mean_loss(best):
+        if best_settled.mean_loss <= (1.0 + WORTHWHILE) * best.mean_loss:
             scores, best, (readings, share, _) = of_settled, best_settled, settled
         else:
             settled, is_no_run_in = None, True
-    by_name = {None: best} | {score.law.name: score for score in scores}
+    by_name: dict[str | None, LawScore | NotScored] = {score.law.name: score for score in scores}
+    by_name[None] = best
     if name not in by_name:
         raise ValueError(f'--law {name!r} is not one of {", ".join(score.law.name for score in scores)}')
     selected = by_name[name]
-    if selected.fit is None or selected.validation is None:
+    if isinstance(selected, NotScored):
         raise ValueError(f'law {name} was not fitted: {selected.why_not}')
     if not selected.validation.error <= LARGEST_ERROR:
         raise ValueError(
@@ -342,8 +343,6 @@ def select_law(
 
 def _settled(data: IdentificationData, best: LawScore) -> run_in.SettledReadings | None:
     """Readings of the settled seal; None if no drift is evident. The ``best`` law tells the offset of the force sum."""
-    if best.fit is None:
-        return None
     return run_in.settled_readings(data.used, fitting.offsets_of(data.used, best.fit.friction(data.used.at)))
 
 
@@ -373,7 +372,7 @@ def _recommended(readings: FrictionReadings, ring: Ring | None, has_fitted_load:
 
 def _scored(
     readings: FrictionReadings, ring: Ring | None, has_fitted_load: bool, tick: validation.Ticks = lambda _: None
-) -> tuple[LawScore, ...]:
+) -> tuple[LawScore | NotScored, ...]:
     """Scores of the ladder on some of the readings."""
     variation = variation_of(readings)
     if has_fitted_load:  # asymmetry is not identifiable: the fitted load holds it

@@ -22,7 +22,7 @@ from seal_friction_ros.core.identification.readings import FrictionReadings, Pre
 from seal_friction_ros.core.identification.run_in import Drift, SettledLaw
 from seal_friction_ros.core.identification.runs import BetweenRuns
 from seal_friction_ros.core.identification.seal_kinds import AreaErrors, ToldApart, proposed_conditions
-from seal_friction_ros.core.identification.selection import ChosenAnew, LawScore, is_beaten
+from seal_friction_ros.core.identification.selection import ChosenAnew, LawScore, NotScored, is_beaten, scored
 from seal_friction_ros.core.identification.signal_preparation import LEVEL_GAP, LEVEL_GAP_MIN
 from seal_friction_ros.core.identification.temperature import TemperatureFit
 from seal_friction_ros.core.identification.validation import CrossValidation, PredictionUncertainty
@@ -33,9 +33,7 @@ from seal_friction_ros.offline.identification.presliding import (
     presliding_part,
 )
 from seal_friction_ros.offline.identification.sources import Sources
-from seal_friction_ros.offline.work.seal_writer import rounded
-
-DIGITS = 6  # of a number in a seal file
+from seal_friction_ros.offline.work.seal_writer import rounded_numbers
 
 
 class Ring(NamedTuple):
@@ -73,7 +71,7 @@ class LawSelection:
     """All candidate laws with their scores, and the law that is saved."""
 
     readings: FrictionReadings  # that laws are chosen, left out and scored on: as measured, or of the settled seal
-    scores: tuple[LawScore, ...]  # on these readings
+    scores: tuple[LawScore | NotScored, ...]  # on these readings
     best: LawScore  # recommended: the simplest law that no other law beats beyond the noise
     fit: fitting.LawFit  # to the readings as measured
     settled: SettledLaw | None  # that the seal file holds; None: that of the readings as measured
@@ -159,11 +157,6 @@ class Identification:
         return next(iter(self.documents.values()))
 
 
-def rounded_value(value: float) -> float:
-    """A number as a seal file of an identification has it."""
-    return rounded(value, DIGITS)
-
-
 def seal_document(
     data: IdentificationData,
     selection: LawSelection,
@@ -181,7 +174,7 @@ def seal_document(
         ValueError: The law makes no valid seal.
     """
     seals, law, kind = len(data.sources.chambers), selection.law, data.kinds[number]
-    values = _json_value(law.of_one_seal((selection.fit if settled is None else settled.fit).values)[number])
+    values = rounded_numbers(law.of_one_seal((selection.fit if settled is None else settled.fit).values)[number])
     of_settled = '' if settled is None else ', of the settled seal'
     of_kind = f'{kind.name} fitted together with the other kinds of seals of the cylinder: ' if kind.name else ''
     relative = math.hypot(quality.uncertainty.relative, 0.0 if settled is None else settled.relative_std)
@@ -203,19 +196,19 @@ def seal_document(
     )
     uncertainty = {'relative_std': relative, 'absolute_std': quality.uncertainty.absolute / seals}
     numbers = {'stiction': stiction, 'stiction_ratio': ratio, 'uncertainty': uncertainty}
-    document |= _json_value({**numbers, 'identified_pressure': _identified_pressure(data, number)})
+    document |= rounded_numbers({**numbers, 'identified_pressure': _identified_pressure(data, number)})
     speed = np.abs(data.used.at.velocity)
     if np.isfinite(speed).all():
-        document['identified_speed'] = _json_value([float(speed.min()), float(speed.max())])
+        document['identified_speed'] = rounded_numbers([float(speed.min()), float(speed.max())])
     document['identified_directions'] = [int(side) for side in np.unique(data.used.at.direction)]
     lacking = _what_the_force_sum_lacks(data, selection.fit)
     if lacking is not None:
         document['force_sum_correction'] = asdict(lacking)
     warmth = data.temperature
     if warmth is not None and not warmth.why_not:
-        document['temperature'] = _json_value(asdict(warmth.scale))
+        document['temperature'] = rounded_numbers(asdict(warmth.scale))
     if presliding is not None:
-        document['presliding'] = _json_value(presliding_part(presliding))
+        document['presliding'] = rounded_numbers(presliding_part(presliding))
     parse_seal(document)
     return document
 
@@ -252,11 +245,11 @@ def _what_the_force_sum_lacks(data: IdentificationData, fit: fitting.LawFit) -> 
     offset = -float(np.mean(fit.offsets[sources]))
     friction = float(fit.friction(readings.at).mean())
     made = data.correction if data.correction is not None and data.correction.is_significant else None
-    area_a, area_b = (0.0, 0.0) if made is None else map(rounded_value, made.areas)
+    area_a, area_b = (0.0, 0.0) if made is None else rounded_numbers(made.areas)
     matters, contains_load = made is not None or abs(offset) >= NOTICED * friction, data.sources.has_fitted_load
     if not matters and not contains_load:
         return None
-    zero = rounded_value(offset) if matters else 0.0
+    zero = rounded_numbers(offset) if matters else 0.0
     return ForceSumCorrection(area_a=area_a, area_b=area_b, offset=zero, contains_load=contains_load)
 
 
@@ -264,20 +257,9 @@ def _without_nan(numbers: Mapping[str, Any]) -> dict[str, Any]:
     """Rounded numbers without those that are not known, at any depth."""
     return {
         key: _without_nan(value) if isinstance(value, Mapping) else value
-        for key, value in _json_value(numbers).items()
+        for key, value in rounded_numbers(numbers).items()
         if value is not None
     }
-
-
-def _json_value(value: Any) -> Any:
-    """Value with each number rounded; None for a number that is not finite."""
-    if isinstance(value, Mapping):
-        return {key: _json_value(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_json_value(item) for item in value]
-    if not isinstance(value, float):
-        return value
-    return rounded_value(value) if math.isfinite(value) else None
 
 
 def identification_section(
@@ -289,8 +271,8 @@ def identification_section(
     presliding: IdentifiedPresliding | None = None,
 ) -> dict[str, Any]:
     """Section ``identification`` of the seal file, which records how it was made; the node ignores it."""
-    measured, fitted = _json_value([[level.measured for level in levels], [level.fitted for level in levels]])
-    section: dict[str, Any] = _json_value(
+    measured, fitted = (rounded_numbers([getattr(level, name) for level in levels]) for name in ('measured', 'fitted'))
+    section: dict[str, Any] = rounded_numbers(
         {
             'law': selection.law.name,
             'recommended_law': selection.best.law.name,
@@ -325,8 +307,8 @@ def kind_section(data: IdentificationData, quality: LawQuality, number: int) -> 
         return {}
     return {
         'kind': kind.name,
-        'friction_N': rounded_value(float(told.friction[number])),
-        'std_of_this_kind_alone_N': rounded_value(float(told.apart_std[number])),
+        'friction_N': rounded_numbers(float(told.friction[number])),
+        'std_of_this_kind_alone_N': rounded_numbers(float(told.apart_std[number])),
         'fitted_together_with': [other.name for other in data.kinds if other is not kind],
     }
 
@@ -340,18 +322,17 @@ def kinds_numbers(found: Identification) -> dict[str, Any]:
     shared = {'friction_at_no_pressure_N' if name == DIVIDED[0] else name: value for name, value in fit.values.items()}
     names = ('friction_at_no_pressure_N', 'viscous_friction', 'stribeck_friction', 'stribeck_velocity', 'asymmetry')
     lacking = found.document.get('force_sum_correction', {})
-    numbers = {
+    return {
         'kinds': [_kind_numbers(found, fit, told, number) for number in range(len(readings.kinds))],
         **{name: shared.get(name, 0.0) for name in names},
-        'correlation': told.correlation.tolist(),
+        'correlation': told.correlation,
         'pressure_a_Pa': _level_means(readings, readings.chamber_pressures[:, 0]),
         'pressure_b_Pa': _level_means(readings, readings.chamber_pressures[:, 1]),
         'area_correction_m2': [lacking.get(f'area_{chamber}', 0.0) for chamber in 'ab'],
-        'offset_N': fit.offsets.tolist(),
+        'offset_N': fit.offsets,
         'next': [{'pressure_a_Pa': c.a, 'pressure_b_Pa': c.b} for c in conditions],
         'next_correlation': correlation,
     }
-    return {key: _json_value(value) for key, value in numbers.items()}
 
 
 def _level_means(readings: FrictionReadings, values: FloatArray) -> list[float]:
@@ -387,7 +368,7 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
     data, selection, quality, levels = found.data, found.selection, found.quality, found.levels
     reference = selection.reference
     correction = data.correction if isinstance(data.correction, ForceCorrection) else None
-    numbers: dict[str, Any] = found.document['identification'] | _json_value(
+    numbers: dict[str, Any] = found.document['identification'] | rounded_numbers(
         {
             'std_N': [level.std for level in levels],
             'left_out_N': [level.left_out for level in levels],
@@ -437,7 +418,7 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
         'samples_total': data.prepared.total,
         'samples_left_out': data.prepared.left_out,
         'remarks': list(found.remarks),
-        **kinds_numbers(found),
+        **rounded_numbers(kinds_numbers(found)),
     }
 
 
@@ -482,9 +463,9 @@ def _breakaway_numbers(found: Identification) -> dict[str, Any]:
     return {
         **law._asdict(),
         'standard_errors': list(law.standard_errors),
-        'pressure_Pa': _json_value(readings.level_pressures.tolist()),
-        'measured_N': _json_value([float(measured[inside].mean()) for inside in levels]),
-        'fitted_N': _json_value([float(fitted[inside].mean()) for inside in levels]),
+        'pressure_Pa': rounded_numbers(readings.level_pressures),
+        'measured_N': rounded_numbers([float(measured[inside].mean()) for inside in levels]),
+        'fitted_N': rounded_numbers([float(fitted[inside].mean()) for inside in levels]),
     }
 
 
@@ -493,11 +474,11 @@ def worst_left_out(levels: Sequence[PressureLevel]) -> float:
     return max(abs(level.left_out / level.measured - 1.0) for level in levels if level.is_used)
 
 
-def _ladder_row(score: LawScore, selection: LawSelection) -> dict[str, Any]:
+def _ladder_row(score: LawScore | NotScored, selection: LawSelection) -> dict[str, Any]:
     row: dict[str, Any] = {'law': score.law.name, 'parameters': len(score.law.parameters)}
-    if score.validation is None or score.fit is None:
+    if isinstance(score, NotScored):
         return row | {'why_not': score.why_not}
-    best = min((s.validation.losses for s in selection.scores if s.validation), key=np.mean)
+    best = min((each.validation.losses for each in scored(selection.scores)), key=np.mean)
     return row | {
         'values': score.fit.values,
         'rms_N': score.validation.rms,

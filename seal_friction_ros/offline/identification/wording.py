@@ -14,7 +14,9 @@ from seal_friction_ros.core.identification.readings import has_pressures
 from seal_friction_ros.core.identification.run_in import SettledLaw
 from seal_friction_ros.core.identification.runs import BetweenRuns
 from seal_friction_ros.core.identification.seal_kinds import poorly_told_apart, proposed_conditions
+from seal_friction_ros.core.identification.selection import LawScore, scored
 from seal_friction_ros.core.identification.temperature import TemperatureFit
+from seal_friction_ros.core.identification.validation import CrossValidation
 from seal_friction_ros.core.identification.what_a_log_tells import FreeRod
 from seal_friction_ros.offline.identification.presliding import presliding_text
 from seal_friction_ros.offline.identification.results import (
@@ -180,9 +182,8 @@ def kinds_warnings(data: IdentificationData, selection: LawSelection, quality: L
 
 def _pressure_gain(selection: LawSelection) -> tuple[str, bool] | None:
     """Best law with against best law without pressure-dependent Coulomb friction: text, and whether pressure pays."""
-    scored = [(score.law, score.validation) for score in selection.scores if score.validation is not None]
-    scored.sort(key=lambda pair: float(pair[1].losses.mean()), reverse=True)
-    best = {law.depends_on_pressure: (law.name, validation) for law, validation in scored}
+    ordered = sorted(scored(selection.scores), key=lambda score: float(score.validation.losses.mean()), reverse=True)
+    best = {score.law.depends_on_pressure: (score.law.name, score.validation) for score in ordered}
     if len(best) < 2:
         return None
     (name, validation), (other_name, other) = best[True], best[False]
@@ -326,13 +327,16 @@ def summary(found: Identification) -> str:
         lines.append(f'  {numbers}{"" if level.is_used else "  outlier, not used"}')
     of_settled = 'of the settled seal, ' if selection.is_chosen_on_settled_seal else ''
     lines += [f'laws on left-out readings ({of_settled}left out by {found.data.used.left_out_by}):']
-    rows = [(score.law.name, score.validation, score.why_not) for score in selection.scores]
-    for name, validation, why_not in [*rows, ('mean of the other readings', selection.reference, '')]:
-        if validation is not None:
+    rows: list[tuple[str, CrossValidation | str | None]] = [
+        (score.law.name, score.validation if isinstance(score, LawScore) else score.why_not)
+        for score in selection.scores
+    ]
+    for name, result in [*rows, ('mean of the other readings', selection.reference)]:
+        if isinstance(result, CrossValidation):
             mark = ' <- recommended' if name == selection.best.law.name else ''
-            lines.append(f'  {name:32} {validation.rms:9.4g} N RMS  {100.0 * validation.error:5.1f} %{mark}')
-        elif why_not:
-            lines.append(f'  {name:32} not fitted: {why_not}')
+            lines.append(f'  {name:32} {result.rms:9.4g} N RMS  {100.0 * result.error:5.1f} %{mark}')
+        elif result:
+            lines.append(f'  {name:32} not fitted: {result}')
     if found.presliding is not None:
         lines += [presliding_text(found.presliding)]
     lines += [f'95 % band: holds {100.0 * quality.coverage:.0f} % of the left-out readings']

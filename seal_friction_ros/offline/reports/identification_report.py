@@ -23,6 +23,7 @@ from seal_friction_ros.core.identification.calibration import Calibration
 from seal_friction_ros.core.identification.candidate_laws import columns_of, normal_forces
 from seal_friction_ros.core.identification.fitting import offsets_of
 from seal_friction_ros.core.identification.readings import FrictionReadings
+from seal_friction_ros.core.identification.selection import NotScored, scored
 from seal_friction_ros.core.identification.validation import CrossValidation
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.identification.pipeline import fitted_readings, mounted_seals
@@ -145,7 +146,7 @@ def _ladder_table(found: Identification) -> Table:
     selection, rows = found.selection, []
     for score in selection.scores:
         cells = [f'{score.law.name} ({score.law.formula})', len(score.law.parameters)]
-        if score.validation is None or score.fit is None:
+        if isinstance(score, NotScored):
             rows.append((*cells, *4 * [DASH], score.why_not))
             continue
         marks = {'recommended': score is selection.best, 'saved': score.law is selection.law}
@@ -409,15 +410,15 @@ def out_of_sample_figure(found: Identification) -> Plot:
 
 def ladder_figure(found: Identification) -> Plot:
     """Out-of-sample error of each law."""
-    scored = [(score, 100.0 * score.validation.error) for score in found.selection.scores if score.validation]
-    errors = [error for _, error in scored]
-    labels = ['\n'.join(wrap(score.law.formula, _FORMULA_WIDTH)) for score, _ in scored]
+    each = [(score, 100.0 * score.validation.error) for score in scored(found.selection.scores)]
+    errors = [error for _, error in each]
+    labels = ['\n'.join(wrap(score.law.formula, _FORMULA_WIDTH)) for score, _ in each]
     heights = np.array([label.count('\n') + 1.6 for label in labels])  # in lines, with a gap
     place = (np.cumsum(heights) - 0.5 * heights).tolist()
     title = 'Error of each law on readings left out of its fit'
     figure, ax = style.new_figure(title, 1.3 + _LINE * float(heights.sum()))
     figure.set_layout_engine('constrained', rect=(0.012, 0.0, 0.98, 1.0))  # the widest label is not cut off
-    colours = [style.GREEN if score is found.selection.best else style.SKY for score, _ in scored]
+    colours = [style.GREEN if score is found.selection.best else style.SKY for score, _ in each]
     bars = ax.barh(place, errors, color=colours, height=1.0)
     ax.bar_label(bars, labels=[f'{error:.1f} %' for error in errors], padding=4)
     ax.set_yticks(place, labels)
