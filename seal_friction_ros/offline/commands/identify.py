@@ -1,7 +1,6 @@
 """``seal_friction identify``: identify a seal file from measurements."""
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -136,8 +135,6 @@ def run(arguments: argparse.Namespace) -> int:
         written: dict[str, Any] = {'seal_file': arguments.out}
         if kinds['kinds']:
             written = {'seal_files': {kind: str(path) for kind, path in files.items()}}
-        numbers, lines = identification_numbers(found), [summary(found)]
-        sheet, more, texts = _next(arguments, found)
         if arguments.report:
             from seal_friction_ros.offline.reports.identification_report import write_identification_report
 
@@ -145,37 +142,27 @@ def run(arguments: argparse.Namespace) -> int:
             written |= {'report': arguments.report, 'figures': figures}
         for kind, path in files.items():
             write_seal(found.documents[kind], path, f'Seal file, {mark("identify")}.')
-        written |= sheet()
+        sheet, more, texts = _next(arguments, found)
     if kinds['kinds']:
         texts = [*texts, f'{", ".join(map(str, files.values()))}: written']
-    return cli.print_result(arguments, numbers | more | written, '\n'.join([*lines, *texts]))
+    numbers = identification_numbers(found) | more | written | sheet
+    return cli.print_result(arguments, numbers, '\n'.join([summary(found), *texts]))
 
 
-def _next(
-    arguments: argparse.Namespace, found: 'Identification'
-) -> tuple[Callable[[], dict[str, Any]], dict[str, Any], list[str]]:
-    """Of ``--next``: what writes the sheet and gives its paths, numbers for JSON, and lines for a person."""
+def _next(arguments: argparse.Namespace, found: 'Identification') -> tuple[dict[str, Any], dict[str, Any], list[str]]:
+    """Write the sheet of ``--next``: its paths and numbers for JSON, and lines for a person."""
     from seal_friction_ros.offline.identification import next_readings
     from seal_friction_ros.offline.identification.data_sheet import write_new_csv, write_sheet
+    from seal_friction_ros.offline.reports.data_sheet_page import write_data_sheet_page
 
     if not arguments.next:
-        return dict, {}, []
+        return {}, {}, []
     if found.data.used.kinds:
-
-        def write_kinds() -> dict[str, Any]:
-            write_new_csv(next_readings.kinds_sheet(found), arguments.next)
-            return {'sheet': arguments.next}
-
-        return write_kinds, {}, []
+        write_new_csv(next_readings.kinds_sheet(found), arguments.next)
+        return {'sheet': arguments.next}, {}, []
     design = next_readings.design_for(found)
-
-    def write() -> dict[str, Any]:
-        from seal_friction_ros.offline.reports.data_sheet_page import write_data_sheet_page
-
-        plan, page = next_readings.plan_of(found, design), arguments.next.with_suffix('.html')
-        write_sheet(plan, arguments.next)
-        write_data_sheet_page(plan, page, 'identify')
-        return {'sheet': arguments.next, 'sheet_page': page}
-
+    plan, page = next_readings.plan_of(found, design), arguments.next.with_suffix('.html')
+    write_sheet(plan, arguments.next)
+    write_data_sheet_page(plan, page, 'identify')
     texts = [f'next: {line}' for line in next_readings.texts_of(found, design)]
-    return write, next_readings.numbers_of(design), texts
+    return {'sheet': arguments.next, 'sheet_page': page}, next_readings.numbers_of(design), texts
