@@ -1,7 +1,7 @@
 """Admission of recorded samples: each is used, or dropped with a reason that is counted.
 
-Stamps that step back (a looped playback, a clock that was set, one stamp of the future) begin a new segment; the time
-of the samples goes on after a pause. A few samples without a value in a row are bridged by a straight line.
+Stamps that jump (a looped playback, a clock that was set, one stamp of the future) are set by the time of receipt, and
+samples go by their stamps. A few samples without a value in a row are bridged by a straight line.
 """
 
 from collections.abc import Mapping
@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
+from seal_friction_ros.core.foundation.stamps import repaired_stamps
 
-PAUSE = 1.0  # [s] between two segments: longer than the longest gap in a stroke (our choice)
-SHUFFLED = 0.01  # [-] of the stamps step back: messages came out of order, and are sorted (our choice)
 BRIDGED = 3  # samples without a value in a row, at most, that a straight line bridges (our choice)
 WORTH_A_WARNING = 0.01  # [-] of the samples, dropped as faulty (our choice)
 MOST_DROPPED = 0.5  # [-] of the samples; more are refused (our choice)
@@ -27,20 +26,23 @@ class Order(NamedTuple):
     rows: IntArray  # indices of the samples that are kept, in order
     seconds: FloatArray  # [s] of each, from 0
     same_stamp: int  # samples that were dropped
-    segments: int
-    is_sorted: bool  # whether the messages came out of order
+    texts: tuple[str, ...]  # what was done about stamps that were out of order
 
 
-def in_order(stamps: IntArray) -> Order:
-    """Order and time of samples by their stamps [ns], shape (n,), as they came."""
-    back = np.diff(stamps) < 0
-    is_sorted = bool(len(back)) and float(back.mean()) > SHUFFLED
-    order = np.argsort(stamps, kind='stable') if is_sorted else np.arange(len(stamps))
-    steps = np.diff(stamps[order], prepend=stamps[order][:1] - 1)
-    index = order[steps != 0]
-    steps = np.diff(stamps[index], prepend=stamps[index][:1])
-    seconds = np.cumsum(np.where(steps < 0, PAUSE, steps * 1e-9))
-    return Order(index, seconds, len(stamps) - len(index), 1 + int((steps < 0).sum()), is_sorted)
+def in_order(stamps: IntArray, received: IntArray) -> Order:
+    """Order and time of samples by their stamps [ns], as they came, and by the times of receipt [ns]; shape (n,) each.
+
+    Stamps that jump are set by the time of receipt (`repaired_stamps`); those of one clock are sorted.
+    """
+    repaired, repair = repaired_stamps(stamps, received)
+    rows = np.argsort(repaired, kind='stable')
+    is_new = np.diff(repaired[rows], prepend=repaired[rows][:1] - 1) > 0
+    back = int((np.diff(repaired) < 0).sum())
+    texts = repair.said('the stamp of the velocity')
+    texts += [f'{back} messages came out of order, and were sorted by their stamps'] * (back > 0)
+    index = rows[is_new]
+    seconds = np.asarray((repaired[index] - repaired[index][:1]) * 1e-9, dtype=np.float64)
+    return Order(index, seconds, len(stamps) - len(index), tuple(texts))
 
 
 def bridged(values: FloatArray) -> tuple[FloatArray, BoolArray]:

@@ -46,6 +46,23 @@ class OperatingConditions(NamedTuple):
         normal_force = math.nan if self.normal_force is None else float(self.normal_force.mean())
         return TypicalReading(friction, float(self.pressure.max()), speed, normal_force)
 
+    def of_seals(self, columns: slice) -> 'OperatingConditions':
+        """What the seals in these columns see; without a normal force."""
+        return self._replace(pressure=self.pressure[:, columns], normal_force=None)
+
+
+class SealKind(NamedTuple):
+    """Equal seals of one kind in a cylinder."""
+
+    name: str  # empty if it is the only kind
+    chambers: tuple[str, ...]  # of each seal of the kind, of `CHAMBERS`
+
+
+def columns_of(kinds: Sequence[SealKind], number: int) -> slice:
+    """Seals of a kind, as columns of the pressures, where all kinds stand in order."""
+    first = sum(len(each.chambers) for each in kinds[:number])
+    return slice(first, first + len(kinds[number].chambers))
+
 
 ParameterValues = Mapping[str, float]
 
@@ -81,6 +98,8 @@ class CandidateLaw:
     parts: Mapping[str, Any] = field(default_factory=dict)
     """known fields of the law: geometry and normal force; empty if it needs neither"""
     has_prior: bool = False  # whether all its terms are fitted at once, with a prior on each (`friction_model`)
+    kinds: tuple[SealKind, ...] = ()
+    """kinds of seals, each with a rise over its pressure; what no pressure divides is that of all seals; empty: one"""
 
     @property
     def depends_on_pressure(self) -> bool:
@@ -102,6 +121,19 @@ class CandidateLaw:
         """Parameters by name, including the fixed ones, from the fitted values in the order of ``parameters``."""
         return {**{p.name: float(x) for p, x in zip(self.parameters, vector, strict=True)}, **self.fixed}
 
+    def of_one_seal(self, values: ParameterValues) -> tuple[ParameterValues, ...]:
+        """Parameters of one seal of each kind: what no pressure divides, by the share of the kind."""
+        if not self.kinds:
+            return (values,)
+        found = []
+        for kind in self.kinds:
+            share = values[f'{kind.name}.share'] / len(kind.chambers)
+            of_kind = {name: values[f'{kind.name}.{name}'] for name in OF_A_KIND}
+            found.append(
+                {name: value * (share if name in DIVIDED else 1.0) for name, value in values.items()} | of_kind
+            )
+        return tuple(found)
+
     def friction_law(self, values: ParameterValues) -> FrictionLaw:
         """The friction law of one seal, without velocity terms; parameters of other laws are ignored.
 
@@ -114,14 +146,26 @@ class CandidateLaw:
         fitted: Any = part_type(**chosen, **({} if part_name else self.parts))
         return self.law_type(**self.parts, **{part_name: fitted}) if part_name else fitted
 
+    def terms(self, values: ParameterValues) -> VelocityTerms | None:
+        """The velocity terms of one seal; None if the law has none."""
+        return VelocityTerms(**{name: values[name] for name in self.velocity_terms}) if self.velocity_terms else None
+
     def friction(self, at: OperatingConditions, values: ParameterValues) -> FloatArray:
         """Magnitude of the sliding friction of all seals [N], shape (n,)."""
-        terms = VelocityTerms(**{name: values[name] for name in self.velocity_terms}) if self.velocity_terms else None
-        return friction_of_seals(numbers_of_law(self.friction_law(values), terms), at)
+        return np.asarray(self.frictions(at, values).sum(axis=1))
 
     def coulomb_friction(self, at: OperatingConditions, values: ParameterValues) -> FloatArray:
         """Magnitude of the Coulomb friction of all seals [N], shape (n,)."""
-        return friction_of_seals(numbers_of_law(self.friction_law(values), None), at)
+        return np.asarray(self.frictions(at, values, with_speed=False).sum(axis=1))
+
+    def frictions(self, at: OperatingConditions, values: ParameterValues, *, with_speed: bool = True) -> FloatArray:
+        """Magnitude of the friction of all seals of each kind [N], shape (n, kinds)."""
+        columns = []
+        for number, of_one in enumerate(self.of_one_seal(values)):
+            seen = at.of_seals(columns_of(self.kinds, number)) if self.kinds else at
+            numbers = numbers_of_law(self.friction_law(of_one), self.terms(of_one) if with_speed else None)
+            columns.append(friction_of_seals(numbers, seen))
+        return np.column_stack(columns)
 
 
 def friction_of_seals(seal: SealNumbers, at: OperatingConditions) -> FloatArray:
@@ -155,6 +199,9 @@ def normal_forces(pressure: FloatArray, geometry: SealGeometry, law: NormalForce
 
 EXPONENTS = {'2_3': ELASTIC_EXPONENT, '1': 1.0, '3_2': 1.5, '2': 2.0}
 """Suffix of the name -> fixed pressure exponent: O-rings are near 2/3, lip seals near 1 to 3/2 (our choice)."""
+DIVIDED = ('friction_at_no_pressure', 'viscous_friction', 'stribeck_friction')
+OF_A_KIND = ('friction_at_one_bar', 'pressure_exponent')
+"""Parameters that no pressure divides between kinds of seals, and those that each kind has"""
 _WITH_SPEEDS = (  # suffix of the name, text of the formula, names of the velocity terms
     ('viscous', 'viscous', ('viscous_friction',)),
     ('stribeck', 'viscous + Stribeck', ('viscous_friction', 'stribeck_friction', 'stribeck_velocity')),
@@ -215,16 +262,22 @@ def with_velocity_terms(base: CandidateLaw, variation: Variation) -> tuple[Candi
     )
 
 
-def law_of_all_terms(variation: Variation) -> CandidateLaw:
-    """The pressure power law, or constant friction, with every velocity term that the data can tell and a prior."""
+def law_of_all_terms(variation: Variation, kinds: tuple[SealKind, ...] = ()) -> CandidateLaw:
+    """The pressure power law, or constant friction, with every velocity term that the data can tell and a prior.
+
+    Of several ``kinds`` each has its own rise and exponent; friction at no pressure and over speed are that of all.
+    """
     law_type = PressurePowerLaw if variation.pressures else ConstantCoulomb
     told = {'asymmetry'} if variation.asymmetry else set()
     told |= {'viscous_friction', 'stribeck_friction', 'stribeck_velocity'} if variation.speeds else set()
     terms = tuple(p for p in fitted_parameters(VelocityTerms) if p.name in told)
     parts = {'viscous_friction': 'viscous', 'stribeck_friction': 'Stribeck', 'asymmetry': 'asymmetry'}
     formula = ' + '.join([law_type.FORMULA, *(parts[p.name] for p in terms if p.name in parts)])
-    parameters = (*fitted_parameters(law_type), *terms)
-    return CandidateLaw('all_terms', f'{formula}, each with a prior', law_type, parameters, has_prior=True)
+    base = fitted_parameters(law_type)
+    of_kinds = [p._replace(name=f'{kind.name}.{p.name}') for kind in kinds for p in base if p.name in OF_A_KIND]
+    first = [p for p in base if not kinds or p.name not in OF_A_KIND]
+    parameters = (*first, *of_kinds, *terms)
+    return CandidateLaw('all_terms', f'{formula}, each with a prior', law_type, parameters, has_prior=True, kinds=kinds)
 
 
 def _with_exponent(law: CandidateLaw, suffix: str, exponent: float) -> CandidateLaw:

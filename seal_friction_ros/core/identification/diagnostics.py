@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from itertools import combinations
 from typing import NamedTuple
 
@@ -11,7 +10,7 @@ import numpy as np
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.identification import runs
 from seal_friction_ros.core.identification.candidate_laws import CandidateLaw
-from seal_friction_ros.core.identification.fitting import LawFit, fit
+from seal_friction_ros.core.identification.fitting import LawFit, fit, slopes
 from seal_friction_ros.core.identification.readings import FrictionReadings
 
 COLLINEAR = 0.9  # correlation above which two regressors are called collinear (our choice)
@@ -140,14 +139,11 @@ def _level_means(found: LawFit, readings: FrictionReadings) -> FloatArray:
 
 
 def _relative_slopes(found: LawFit, readings: FrictionReadings, means: FloatArray) -> FloatArray:
-    """Relative change of ``means`` > 0 by a relative change of each parameter, by differences; (levels, parameters)."""
-    result = np.empty((len(means), len(found.law.parameters)))
-    for i, parameter in enumerate(found.law.parameters):
-        value = found.values[parameter.name]
-        share = 1e-4 if value + 1e-4 * (abs(value) or 1.0) <= parameter.upper else -1e-4
-        moved = replace(found, values=found.values | {parameter.name: value + share * (abs(value) or 1.0)})
-        result[:, i] = (_level_means(moved, readings) / np.where(means > 0.0, means, np.inf) - 1.0) / share
-    return result
+    """Relative change of ``means`` > 0 by a relative change of each parameter, shape (levels, parameters)."""
+    each = slopes(found.law, found.values, readings.at)
+    sizes = np.array([abs(found.values[p.name]) or 1.0 for p in found.law.parameters])
+    of_levels = np.array([each[inside].mean(axis=0) for inside in readings.levels.values()])
+    return np.asarray(of_levels * sizes / np.where(means > 0.0, means, np.inf)[:, np.newaxis])
 
 
 class RunChange(NamedTuple):

@@ -26,10 +26,10 @@ from seal_friction_ros.core.identification.candidate_laws import (
     with_velocity_terms,
 )
 from seal_friction_ros.core.identification.diagnostics import CorrelatedPair
-from seal_friction_ros.core.identification.fitting import LawFit
+from seal_friction_ros.core.identification.fitting import LawFit, slopes
 from seal_friction_ros.core.identification.readings import FrictionReadings, are_far_apart
 from seal_friction_ros.core.identification.runs import PRIOR_FREEDOM, BetweenRuns
-from seal_friction_ros.core.identification.selection import LawScore, is_beaten, losses_of, mean_loss
+from seal_friction_ros.core.identification.selection import LawScore, Scores, is_beaten, scored
 from seal_friction_ros.core.identification.validation import jackknife_errors
 
 READINGS = 8  # pressures and speeds that are proposed, each in both directions (our choice)
@@ -101,36 +101,11 @@ class ExperimentDesign:
 
 
 @dataclass(frozen=True, eq=False)
-class _Information:
-    """Information on the parameters: sums over readings of their derivatives, each over its standard deviation."""
-
-    squares: FloatArray  # of the derivatives by the parameters, shape (parameters, parameters)
-    products: FloatArray  # with the derivative by the offset of the force sum, shape (parameters,)
-    offset: float  # squares of the latter
-
-    def plus(self, rows: FloatArray, offset_column: FloatArray) -> '_Information':
-        """With further readings: derivatives of shape (n, parameters), and by the offset, shape (n,)."""
-        return _Information(
-            self.squares + rows.T @ rows,
-            self.products + rows.T @ offset_column,
-            self.offset + float(offset_column @ offset_column),
-        )
-
-    @property
-    def matrix(self) -> FloatArray:
-        r"""Information matrix with the offset eliminated, :math:`A^T A - A^T h\,h^T A / h^T h` (Schur complement)."""
-        if self.offset == 0.0:
-            return self.squares
-        return np.asarray(self.squares - np.outer(self.products, self.products) / self.offset)
-
-
-@dataclass(frozen=True, eq=False)
 class _Model:
     """Law linearised about its fitted parameters."""
 
     law: CandidateLaw
     values: ParameterValues
-    steps: FloatArray  # of the differences, shape (parameters,)
     seals: int
     mean: float  # [N] mean friction of the readings
     held_scale: float  # [N] divisor of a deviation; NaN if it is the friction
@@ -140,14 +115,8 @@ class _Model:
         return np.maximum(self.law.friction(at, self.values), 0.05 * self.mean)
 
     def slopes(self, at: OperatingConditions) -> FloatArray:
-        """Derivative of the friction [N] by each parameter, by forward differences, shape (n, parameters)."""
-        base = self.law.friction(at, self.values)
-        columns = []
-        for parameter, size in zip(self.law.parameters, self.steps.tolist(), strict=True):
-            value = self.values[parameter.name]
-            step = size if value + size <= parameter.upper else -size
-            columns.append((self.law.friction(at, {**self.values, parameter.name: value + step}) - base) / step)
-        return np.column_stack(columns)
+        """Derivative of the friction [N] by each parameter, shape (n, parameters)."""
+        return slopes(self.law, self.values, at)
 
     def scale(self, at: OperatingConditions) -> FloatArray:
         """Divisor of the deviation of a new reading [N], as of `FrictionReadings.scale`; of pairs of directions."""
@@ -166,7 +135,7 @@ class _Model:
 
 
 def design_experiment(
-    scores: Sequence[LawScore],
+    scores: Scores,
     readings: FrictionReadings,
     between: BetweenRuns | None,
     of_band: float,
@@ -212,14 +181,14 @@ def design_experiment(
     identified, pressures = _pressure_ranges(readings)
     speeds = _grid_speeds(used_speeds)
     prior = _prior(model, *pressures, speeds)
-    slopes = model.slopes(at)
-    weighted = _without_offsets(slopes, readings) / scatter
+    at_readings = model.slopes(at)
+    weighted = _without_offsets(at_readings, readings) / scatter
     worth = _readings_worth_one(chosen, readings, scatter)
     had = weighted.T @ weighted / worth
 
     range_slopes = _relative_slopes(model, pressures, speeds)
-    at_readings = slopes / model.friction(at)[:, np.newaxis]
-    identified_slopes = _relative_slopes(model, identified, used_speeds) if is_varied else at_readings
+    relative = at_readings / model.friction(at)[:, np.newaxis]
+    identified_slopes = _relative_slopes(model, identified, used_speeds) if is_varied else relative
     before = _error(range_slopes, had + prior)
     law_error = _error(identified_slopes, had + prior)
     parts = {RUN_TO_RUN: of_band, LAW: law_error, SCATTER: scatter}
@@ -255,18 +224,16 @@ def design_experiment(
     )
 
 
-def laws_not_beaten(scores: Sequence[LawScore]) -> list[LawScore]:
+def laws_not_beaten(scores: Scores) -> list[LawScore]:
     """Laws that the best law (smallest mean loss) does not beat, each parameter of which has an effect.
 
     Raises:
         ValueError: No law was fitted.
     """
-    scored = [score for score in scores if score.fit is not None and score.losses is not None]
-    if not scored:
-        raise ValueError('no law was fitted, so there is nothing to design readings for')
-    best = min(scored, key=mean_loss)
-    left = [s for s in scored if s is best or not is_beaten(losses_of(s), losses_of(best), many_times=True)]
-    return [s for s in left if s.fit is not None and math.isfinite(s.fit.condition_number)] or [best]
+    found = scored(scores)
+    best = min(found, key=lambda score: score.mean_loss)
+    left = [s for s in found if s is best or not is_beaten(s.losses, best.losses, many_times=True)]
+    return [score for score in left if math.isfinite(score.fit.condition_number)] or [best]
 
 
 def repeated_run(between: BetweenRuns, freedom: int) -> RepeatedRun:
@@ -287,18 +254,12 @@ def _richest(near: Sequence[LawScore]) -> LawScore:
 
     A law with a parameter at its upper bound does not count where there are others.
     """
-    inside = [score for score in near if score.fit is not None and not _is_at_upper_bound(score.fit)]
-    return min(inside or near, key=lambda score: (-len(score.law.parameters), mean_loss(score)))
+    inside = [score for score in near if not _is_at_upper_bound(score.fit)]
+    return min(inside or near, key=lambda score: (-len(score.law.parameters), score.mean_loss))
 
 
 def _is_at_upper_bound(fit: LawFit) -> bool:
     return any(fit.values[p.name] > p.upper - 1e-6 * (p.upper - p.lower) for p in fit.law.parameters)
-
-
-def _fit_of(score: LawScore) -> LawFit:
-    if score.fit is None:
-        raise ValueError(f'{score.law.name} was not fitted')
-    return score.fit
 
 
 def _model(score: LawScore, readings: FrictionReadings, at: OperatingConditions) -> _Model:
@@ -306,23 +267,21 @@ def _model(score: LawScore, readings: FrictionReadings, at: OperatingConditions)
 
     A law that itself depends on speed gets no viscous friction.
     """
-    law, values = score.law, dict(_fit_of(score).values)
+    law, values = score.law, dict(score.fit.values)
     if 'friction_at_no_pressure' in law.fixed:
         laws = candidate_laws(Variation(speeds=False))
         law = next(found for found in laws if found.name == 'pressure_power_law_2_3')
     if not law.depends_on_speed and 'viscous_friction' not in law.velocity_terms:
         law = with_velocity_terms(law, Variation(asymmetry=False))[0]
         values['viscous_friction'] = 0.0
-    mean = float(score.fit.friction(readings.at).mean()) if score.fit else math.nan
-    typical = at.typical(mean / at.pressure.shape[1])
-    sizes = [max(abs(values[p.name]), 1e-3 * abs(p.start(typical)), 1e-12) for p in law.parameters]
+    mean = float(score.fit.friction(readings.at).mean())
     scale = float(readings.scale[0]) if readings.are_samples else math.nan
-    return _Model(law, values, 1e-4 * np.array(sizes), at.pressure.shape[1], mean, scale)
+    return _Model(law, values, at.pressure.shape[1], mean, scale)
 
 
 def _scatter(score: LawScore, readings: FrictionReadings) -> float:
     """Standard deviation of a weighted deviation from the fitted law [-]."""
-    fit = _fit_of(score)
+    fit = score.fit
     deviation = (readings.magnitudes(fit.offsets) - fit.friction(readings.at)) / readings.scale
     freedom = readings.count - len(fit.law.parameters) - sum(len(index) > 0 for index in readings.two_sided)
     return max(math.sqrt(float(np.sum(deviation**2)) / max(freedom, 1)), SMALLEST_SCATTER)
@@ -341,10 +300,8 @@ def _without_offsets(slopes: FloatArray, readings: FrictionReadings) -> FloatArr
 
 def _readings_worth_one(score: LawScore, readings: FrictionReadings, scatter: float) -> float:
     """Variance of the law at the readings by the jackknife over that of independent readings, at least 1."""
-    fit, validation = _fit_of(score), score.validation
-    if validation is None:
-        return 1.0
-    estimates = [fit.law.friction(readings.at, fit.law.named(vector)) for vector in validation.parameters]
+    fit = score.fit
+    estimates = [fit.law.friction(readings.at, fit.law.named(vector)) for vector in score.validation.parameters]
     found = jackknife_errors(np.array(estimates) / readings.scale)
     orthonormal = np.linalg.svd(fit.jacobian, full_matrices=False)[0]
     independent = scatter**2 * np.sum(orthonormal**2, axis=1)
@@ -436,7 +393,7 @@ def _greedy(
 
     The points ``first`` come first, then ``count`` of the ``grid``. All are one source with one unknown offset.
     """
-    total = _Information(np.zeros_like(information), np.zeros(len(information)), 0.0)
+    total = np.zeros((len(information) + 1, len(information) + 1))  # the offset last
     points: list[tuple[float, float]] = []
     errors: list[float] = []
     every = [*first, *grid]
@@ -444,19 +401,26 @@ def _greedy(
     for point in every:
         at = model.conditions([point])
         weight = model.scale(at) * scatter
-        rows[point] = model.slopes(at) / weight[:, np.newaxis], at.direction / weight
+        derivatives = np.column_stack((model.slopes(at), at.direction)) / weight[:, np.newaxis]
+        rows[point] = derivatives.T @ derivatives
 
     def error_with(point: tuple[float, float]) -> float:
-        return _error(range_slopes, information + total.plus(*rows[point]).matrix)
+        return _error(range_slopes, information + _without_offset(total + rows[point]))
 
     for number in range(len(first) + min(count, len(grid))):
         open_points = [first[number]] if number < len(first) else [p for p in grid if p not in points]
         found = [float(f'{error_with(point):.9g}') for point in open_points]  # a tie goes to the first of the grid
         best = int(np.argmin(found))
-        total = total.plus(*rows[open_points[best]])
+        total = total + rows[open_points[best]]
         points.append(open_points[best])
         errors.append(found[best])
-    return points, errors, total.matrix
+    return points, errors, _without_offset(total)
+
+
+def _without_offset(information: FloatArray) -> FloatArray:
+    r"""Information on the parameters, the offset in the last row eliminated: :math:`A - b\,b^T / c`."""
+    by_offset = information[:-1, -1]
+    return np.asarray(information[:-1, :-1] - np.outer(by_offset, by_offset) / max(information[-1, -1], 1e-300))
 
 
 def _correlation(information: FloatArray) -> FloatArray:
@@ -512,7 +476,7 @@ def _disagreements(near: Sequence[LawScore], model: _Model, points: Sequence[tup
     if not points:
         return []
     at = model.conditions(points)
-    frictions = np.array([_fit_of(score).friction(at) for score in near])
+    frictions = np.array([score.fit.friction(at) for score in near])
     mean = np.maximum(frictions.mean(axis=0), 0.05 * model.mean)
     spread = np.ptp(frictions, axis=0) / mean
     return [float(value) for value in spread.reshape(-1, len(DIRECTIONS)).max(axis=1)]

@@ -8,7 +8,12 @@ import numpy as np
 from scipy.optimize import least_squares, nnls
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, OperatingConditions, ParameterValues
+from seal_friction_ros.core.identification.candidate_laws import (
+    CandidateLaw,
+    OperatingConditions,
+    ParameterValues,
+    columns_of,
+)
 from seal_friction_ros.core.identification.friction_model import ModelFit, Told, fit_model
 from seal_friction_ros.core.identification.readings import FrictionReadings
 
@@ -131,26 +136,48 @@ def fit(
 
 def _fit_with_prior(law: CandidateLaw, readings: FrictionReadings) -> LawFit:
     """As `fit`, for a law of all terms: the most probable one."""
-    seals, terms = readings.at.pressure.shape[1], law.velocity_terms
+    terms, seals = law.velocity_terms, readings.at.pressure.shape[1]
     told = Told('viscous_friction' in terms, 'stribeck_friction' in terms, 'asymmetry' in terms, areas=False)
-    model = fit_model(readings, [tuple(range(seals))] if law.depends_on_pressure else [], told)
-    return LawFit(law, values_of_model(law, model, seals), model.offsets, model.rows, model)
+    model = fit_model(readings, columns_of_seals(law, seals), told)
+    values = values_of_model(law, model, seals)
+    return LawFit(law, values, model.offsets, slopes(law, values, readings.at) / readings.scale[:, np.newaxis], model)
+
+
+def columns_of_seals(law: CandidateLaw, seals: int) -> list[tuple[int, ...]]:
+    """Seals of each kind, as columns of the pressures; empty for a law without pressure."""
+    if law.kinds:
+        return [tuple(range(seals)[columns_of(law.kinds, number)]) for number in range(len(law.kinds))]
+    return [tuple(range(seals))] if law.depends_on_pressure else []
 
 
 def values_of_model(law: CandidateLaw, model: ModelFit, seals: int) -> dict[str, float]:
-    """Parameters of one seal of the law of all terms."""
+    """Parameters of the law of all terms: of one seal, or of all seals of several kinds and the shares of the kinds."""
     falling, speed = model.stribeck
+    of = 1 if law.kinds else seals
     values = {
-        'coulomb_friction_at_any_pressure': model.constant / seals,
-        'friction_at_no_pressure': model.constant / seals,
-        'viscous_friction': model.viscous / seals,
-        'stribeck_friction': falling / seals,
+        'coulomb_friction_at_any_pressure': model.constant / of,
+        'friction_at_no_pressure': model.constant / of,
+        'viscous_friction': model.viscous / of,
+        'stribeck_friction': falling / of,
         'stribeck_velocity': speed,
         'asymmetry': model.asymmetry,
     }
-    if law.depends_on_pressure:
-        values |= {'friction_at_one_bar': float(model.rises[0]), 'pressure_exponent': model.exponents[0]}
-    return {parameter.name: values[parameter.name] for parameter in law.parameters}
+    names = [f'{kind.name}.' for kind in law.kinds] or ['']
+    for name, rise, exponent in zip(names, model.rises.tolist(), model.exponents, strict=False):
+        values |= {f'{name}friction_at_one_bar': rise, f'{name}pressure_exponent': exponent}
+    shares = zip(names, model.division.tolist(), strict=False) if law.kinds else ()
+    return {p.name: values[p.name] for p in law.parameters} | {f'{name}share': share for name, share in shares}
+
+
+def slopes(law: CandidateLaw, values: ParameterValues, at: OperatingConditions) -> FloatArray:
+    """Derivative of the friction of all seals [N] by each parameter, by differences, shape (n, parameters)."""
+    base, columns = law.friction(at, values), []
+    for parameter in law.parameters:
+        value = values[parameter.name]
+        step = 1e-4 * (abs(value) or 1.0)
+        step = step if value + step <= parameter.upper else -step
+        columns.append((law.friction(at, {**values, parameter.name: value + step}) - base) / step)
+    return np.column_stack(columns)
 
 
 def _fit_linear(law: CandidateLaw, readings: FrictionReadings) -> LawFit:

@@ -21,6 +21,11 @@ class ForceCorrection(NamedTuple):
     line: OffsetLine  # offset of the force sum over pressure
     is_significant: bool  # whether it is beyond the noise, and large enough to matter
 
+    @property
+    def areas(self) -> tuple[float, float]:
+        """Areas to be added to those of chambers a and b [m^2]."""
+        return (self.area, 0.0) if self.chamber == 'a' else (0.0, self.area)
+
     def corrected(self, signals: Signals) -> Signals:
         """Signals whose force sum has the area corrected; the offset stays, since each source may have its own."""
         pressure = signals.pressure_a if self.chamber == 'a' else signals.pressure_b

@@ -23,7 +23,6 @@ from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntA
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
 from seal_friction_ros.core.identification.readings import FrictionReadings
-from seal_friction_ros.core.identification.signal_preparation import half_range
 
 # Priors: mean, standard deviation, lower and upper bound. A share is one of the mean friction.
 FRICTION_PRIOR = (0.0, 10.0, 0.0, 100.0)  # [-] share: f_0, and the rise of each kind at its mean pressure
@@ -70,27 +69,51 @@ class _Layout(NamedTuple):
         return 2 * self.kinds + 4
 
     @property
+    def areas(self) -> slice:
+        return slice(self.asymmetry + 1, self.asymmetry + 3)
+
+    @property
     def parameters(self) -> int:
         return 2 * self.kinds + 7 + self.sources
+
+
+class Problem(NamedTuple):
+    """Readings in the form of the fit."""
+
+    readings: FrictionReadings
+    columns: tuple[tuple[int, ...], ...]  # seals of each kind
+    size: float  # [N] mean friction
+    speed: float  # [m/s] mean
+    highest: FloatArray  # [Pa] pressure of chambers a and b, shape (2,)
+    free: FloatArray  # columns of areas and offsets [N], shape (n, 2 + sources)
+    prior: FloatArray  # mean, standard deviation, lower and upper bound of each parameter, shape (count, 4)
+    sources: IntArray  # that have an offset
 
 
 @dataclass(frozen=True, eq=False)
 class ModelFit:
     """The model fitted to readings."""
 
+    problem: Problem
     vector: FloatArray  # f_0, rises, viscous, Stribeck [share]; m, ln v_S, a; areas, offsets [share]
     covariance: FloatArray  # of the vector
-    columns: tuple[tuple[int, ...], ...]  # seals of each kind
-    size: float  # [N] mean friction
-    speed: float  # [m/s] mean
-    at: OperatingConditions  # of the readings
-    highest: FloatArray  # [Pa] pressure of chambers a and b, shape (2,)
-    sources: int
-    scatter: float  # [-] standard deviation of the friction between clusters
     rows: FloatArray  # weighted derivatives of what is left of each reading, shape (n, parameters)
     left: FloatArray  # weighted rest of each reading, shape (n,)
-    two_sided: IntArray  # sources with an offset
-    is_free: BoolArray  # parameters that are at no bound
+
+    @property
+    def columns(self) -> tuple[tuple[int, ...], ...]:
+        """Seals of each kind, as columns of the pressures."""
+        return self.problem.columns
+
+    @property
+    def size(self) -> float:
+        """Mean friction of the readings [N]."""
+        return self.problem.size
+
+    @property
+    def layout(self) -> '_Layout':
+        """Where the parameters stand in the vector."""
+        return _Layout(len(self.columns), len(self.problem.sources))
 
     @property
     def constant(self) -> float:
@@ -103,44 +126,53 @@ class ModelFit:
         return np.asarray(self.vector[1 : 1 + len(self.columns)] * self.size)
 
     @property
+    def division(self) -> FloatArray:
+        """Share of each kind in the friction that no pressure divides [-], shape (kinds,): that of the rising parts.
+
+        A seal that is pressed harder at no pressure gains more by pressure, too: our choice. Without any rise, each
+        seal has the same.
+        """
+        parts = self.parts if self.parts.sum() > 0.0 else np.array([float(len(each)) for each in self.columns])
+        return np.asarray(parts / parts.sum())
+
+    @property
     def areas(self) -> FloatArray:
         """Error of the areas of chambers a and b in the force sum [m^2], shape (2,)."""
-        first = _Layout(len(self.columns), 0).asymmetry + 1
-        return np.asarray(self.vector[first : first + 2] * self.size / self.highest)
+        return np.asarray(self.vector[self.layout.areas] * self.size / self.problem.highest)
 
     @property
     def offsets(self) -> FloatArray:
         """Offset of the force sum of each source [N], shape (sources,)."""
-        found = np.zeros(self.sources)
-        found[self.two_sided] = self.vector[_Layout(len(self.columns), 0).asymmetry + 3 :] * self.size
+        found = np.zeros(len(self.problem.readings.names))
+        found[self.problem.sources] = self.vector[self.layout.asymmetry + 3 :] * self.size
         return found
 
     @property
     def exponents(self) -> tuple[float, ...]:
         """Exponent m of each kind."""
-        return tuple(self.vector[_Layout(len(self.columns), 0).exponents].tolist())
+        return tuple(self.vector[self.layout.exponents].tolist())
 
     @property
     def rises(self) -> FloatArray:
         """K of one seal of each kind at 1 bar [N], shape (kinds,)."""
-        means = [_power_sum(self.at, c, m)[0].mean() for c, m in zip(self.columns, self.exponents, strict=True)]
+        means = [total for total, _ in _means(self.problem, self.exponents)]
         return np.asarray(self.parts / np.maximum(means, 1e-300))
 
     @property
     def viscous(self) -> float:
         """Viscous friction of all seals [N s/m]."""
-        return float(self.vector[len(self.columns) + 1]) * self.size / self.speed
+        return float(self.vector[len(self.columns) + 1]) * self.size / self.problem.speed
 
     @property
     def stribeck(self) -> tuple[float, float]:
         """Stribeck friction of all seals [N] and its speed [m/s]."""
-        layout = _Layout(len(self.columns), 0)
-        return float(self.vector[layout.kinds + 2]) * self.size, self.speed * math.exp(self.vector[layout.speed])
+        speed = self.problem.speed * math.exp(self.vector[self.layout.speed])
+        return float(self.vector[self.layout.kinds + 2]) * self.size, speed
 
     @property
     def asymmetry(self) -> float:
         """Share a by which friction is larger on extension."""
-        return float(self.vector[_Layout(len(self.columns), 0).asymmetry])
+        return float(self.vector[self.layout.asymmetry])
 
     @property
     def errors(self) -> FloatArray:
@@ -150,24 +182,18 @@ class ModelFit:
     @property
     def surest_area(self) -> float:
         """Standard errors by which an area of the force sum is off [-]."""
-        first = _Layout(len(self.columns), 0).asymmetry + 1
-        both = slice(first, first + 2)
+        both = self.layout.areas
         return float((np.abs(self.vector[both]) / np.sqrt(np.diag(self.covariance)[both])).max())
 
     def friction(self, at: OperatingConditions) -> FloatArray:
         """Magnitude of the friction of all seals [N], shape (n,)."""
-        return self._with_slopes(at)[0]
+        return _magnitude(self.problem, self.vector, at)[0]
 
     def std(self, at: OperatingConditions) -> FloatArray:
         """Standard deviation of the friction [N], shape (n,), by the covariance of the posterior."""
-        slopes = self._with_slopes(at)[1]
+        slopes = _magnitude(self.problem, self.vector, at)[1]
         known = slopes.shape[1]
         return np.asarray(np.sqrt(np.einsum('ni,ij,nj->n', slopes, self.covariance[:known, :known], slopes)))
-
-    def _with_slopes(self, at: OperatingConditions) -> tuple[FloatArray, FloatArray]:
-        means = [_power_sum(self.at, c, m) for c, m in zip(self.columns, self.exponents, strict=True)]
-        logs = [(float(total.mean()), float(slope.mean())) for total, slope in means]
-        return _magnitude(self.vector, at, self.columns, logs, (self.size, self.speed))
 
 
 def _power_sum(at: OperatingConditions, columns: Sequence[int], m: float) -> tuple[FloatArray, FloatArray]:
@@ -177,18 +203,16 @@ def _power_sum(at: OperatingConditions, columns: Sequence[int], m: float) -> tup
     return powers.sum(axis=1), (powers * np.log(pressure)).sum(axis=1)
 
 
-def _magnitude(
-    vector: FloatArray,
-    at: OperatingConditions,
-    columns: Sequence[tuple[int, ...]],
-    means: Sequence[tuple[float, float]],
-    sizes: tuple[float, float],
-) -> tuple[FloatArray, FloatArray]:
-    """Friction [N], shape (n,), and its derivatives by the parameters of the friction, shape (n, parameters).
+def _means(problem: Problem, exponents: Sequence[float] | FloatArray) -> list[tuple[float, float]]:
+    """Means of `_power_sum` over the fitted readings, of each kind."""
+    each = [_power_sum(problem.readings.at, c, float(m)) for c, m in zip(problem.columns, exponents, strict=True)]
+    return [(float(total.mean()), float(slope.mean())) for total, slope in each]
 
-    ``means`` are those of `_power_sum` over the fitted readings, ``sizes`` friction [N] and speed [m/s].
-    """
-    layout, (size, typical) = _Layout(len(columns), 0), sizes
+
+def _magnitude(problem: Problem, vector: FloatArray, at: OperatingConditions) -> tuple[FloatArray, FloatArray]:
+    """Friction [N], shape (n,), and its derivatives by the parameters of the friction, shape (n, parameters)."""
+    layout, size, columns = _Layout(len(problem.columns), 0), problem.size, problem.columns
+    means, typical = _means(problem, vector[layout.exponents]), problem.speed
     speed, direction = np.nan_to_num(np.abs(at.velocity)) / typical, at.direction
     falling = math.exp(-vector[layout.speed]) * speed
     rising, bending = [], []
@@ -204,24 +228,11 @@ def _magnitude(
     return size * side[:, 0] * symmetric, size * slopes
 
 
-class _Problem(NamedTuple):
-    """Readings in the form of the fit."""
-
-    readings: FrictionReadings
-    columns: tuple[tuple[int, ...], ...]
-    size: float  # [N]
-    speed: float  # [m/s]
-    free: FloatArray  # columns of areas and offsets [N], shape (n, 2 + sources)
-    prior: FloatArray  # mean, standard deviation, lower and upper bound of each parameter, shape (count, 4)
-    sources: IntArray  # that have an offset
-
-
 def _problem(
     readings: FrictionReadings, columns: Sequence[tuple[int, ...]], told: Told, chamber_pressures: FloatArray | None
-) -> _Problem:
+) -> Problem:
     two_sided = np.array([s for s, index in enumerate(readings.two_sided) if len(index)], dtype=np.int64)
-    offsets = offsets_by_half_range(readings)
-    size = max(float(np.abs(readings.magnitudes(offsets)).mean()), 1e-12)
+    size = max(float(np.abs(readings.magnitudes(readings.offsets)).mean()), 1e-12)
     speed = max(float(np.nan_to_num(np.abs(readings.at.velocity)).mean()), 1e-9)
     highest = np.ones(2) if chamber_pressures is None else np.maximum(np.abs(chamber_pressures).max(axis=0), 1.0)
     both = np.zeros((readings.count, 2)) if chamber_pressures is None else chamber_pressures / highest
@@ -233,16 +244,10 @@ def _problem(
     prior += [STRIBECK_SPEED_PRIOR, ASYMMETRY_PRIOR if told.asymmetry else off]
     prior += [AREA_PRIOR if told.areas else off] * 2 + [OFFSET_PRIOR] * len(two_sided)
     table = np.array(prior)
-    return _Problem(readings, tuple(columns), size, speed, free, table, two_sided)
+    return Problem(readings, tuple(columns), size, speed, highest, free, table, two_sided)
 
 
-def offsets_by_half_range(readings: FrictionReadings) -> FloatArray:
-    """Offset of the force sum of each source [N], in which the friction of its two directions cancels."""
-    each = [readings.source == source for source in range(len(readings.names))]
-    return np.array([readings.half_range(inside).offset if inside.any() else 0.0 for inside in each])
-
-
-def _solved(problem: _Problem, weight: FloatArray, start: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _solved(problem: Problem, weight: FloatArray, start: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Vector, and weighted Jacobian and rest with the rows of the prior: Levenberg and Marquardt within bounds."""
     readings, prior = problem.readings, problem.prior
     at, direction = readings.at, readings.at.direction[:, np.newaxis]
@@ -251,9 +256,7 @@ def _solved(problem: _Problem, weight: FloatArray, start: FloatArray) -> tuple[F
 
     def both(vector: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Weighted rest and Jacobian at a vector, the rows of the prior last."""
-        means = [_power_sum(at, c, float(m)) for c, m in zip(problem.columns, vector[layout.exponents], strict=True)]
-        pairs = [(float(total.mean()), float(slope.mean())) for total, slope in means]
-        friction, slopes = _magnitude(vector, at, problem.columns, pairs, (problem.size, problem.speed))
+        friction, slopes = _magnitude(problem, vector, at)
         rest = readings.force - direction[:, 0] * friction - problem.free @ vector[known:]
         jacobian = -np.column_stack((direction * slopes, problem.free)) * weight[:, np.newaxis]
         ahead = (vector - prior[:, 0]) / prior[:, 1]
@@ -290,8 +293,8 @@ def _clusters(readings: FrictionReadings) -> IntArray:
     return np.asarray(np.unique(np.column_stack((readings.source, readings.level)), axis=0, return_inverse=True)[1])
 
 
-def _weights(readings: FrictionReadings, residual: FloatArray, size: float, fitted: float) -> tuple[FloatArray, float]:
-    """Weight of each reading [1/N], and standard deviation of the friction between clusters [-].
+def _weights(readings: FrictionReadings, residual: FloatArray, size: float, fitted: float) -> FloatArray:
+    """Weight of each reading [1/N].
 
     ``residual`` is that of the magnitudes [N], shape (n,), after a fit of ``fitted`` effective parameters. The variance
     of a reading is that within a cluster, and as many times that between clusters as the cluster has readings. The
@@ -307,7 +310,7 @@ def _weights(readings: FrictionReadings, residual: FloatArray, size: float, fitt
     of_prior = CLUSTER_FREEDOM / (CLUSTER_FREEDOM + freedom)
     between = max(found, 1e-8) ** (1.0 - of_prior) * CLUSTER_PRIOR ** (2.0 * of_prior)
     variance = within + count[cluster] * between
-    return 1.0 / (np.maximum(readings.scale, 1e-3 * size) * np.sqrt(variance)), math.sqrt(between)
+    return np.asarray(1.0 / (np.maximum(readings.scale, 1e-3 * size) * np.sqrt(variance)))
 
 
 def fit_model(
@@ -330,15 +333,14 @@ def fit_model(
     layout = _Layout(len(columns), len(problem.sources))
     starts = [near] if near is not None and len(near) == layout.parameters else _starts(problem, layout, told)
     weight = 1.0 / (np.maximum(readings.scale, 1e-3 * problem.size) * CLUSTER_PRIOR)
-    scatter = CLUSTER_PRIOR
     for _ in range(2):
         solved = (_solved(problem, weight, start) for start in starts)
         vector, jacobian, left = min(solved, key=lambda found: float(found[2] @ found[2]))
-        fit = _model_fit(problem, vector, jacobian, scatter, left, chamber_pressures)
+        fit = _model_fit(problem, vector, jacobian, left)
         free = problem.free @ vector[layout.asymmetry + 1 :]
         residual = readings.at.direction * (readings.force - free) - fit.friction(readings.at)
         fitted = layout.parameters - float(np.sum(np.diag(fit.covariance) / problem.prior[:, 1] ** 2))
-        weight, scatter = _weights(readings, residual, problem.size, fitted)
+        weight = _weights(readings, residual, problem.size, fitted)
         starts = [vector]
     choices = [
         _problem(readings, columns, told._replace(stribeck=falling, asymmetry=uneven), chamber_pressures)
@@ -347,7 +349,7 @@ def fit_model(
     ]
     found = [(each, *_solved(each, weight, starts[0])) for each in choices]
     problem, vector, jacobian, left = max(found, key=lambda one: _evidence(*one))
-    return _model_fit(problem, vector, jacobian, scatter, left, chamber_pressures)
+    return _model_fit(problem, vector, jacobian, left)
 
 
 def without_group(fit: ModelFit, out: BoolArray) -> ModelFit:
@@ -355,7 +357,9 @@ def without_group(fit: ModelFit, out: BoolArray) -> ModelFit:
 
     Parameters at a bound stay there.
     """
-    free = np.flatnonzero(fit.is_free)
+    low, high = fit.problem.prior[:, 2], fit.problem.prior[:, 3]
+    margin = 1e-6 * (high - low)
+    free = np.flatnonzero((fit.vector > low + margin) & (fit.vector < high - margin))
     rows = fit.rows[out][:, free]
     everything = np.linalg.pinv(fit.covariance, hermitian=True)[np.ix_(free, free)]
     step = np.linalg.lstsq(everything - rows.T @ rows, rows.T @ fit.left[out], rcond=1e-14)[0]
@@ -363,8 +367,7 @@ def without_group(fit: ModelFit, out: BoolArray) -> ModelFit:
     vector[free] += step
     linear = slice(0, len(fit.columns) + 3)
     vector[linear] = np.maximum(vector[linear], 0.0)
-    layout = _Layout(len(fit.columns), 0)
-    vector[layout.exponents] = np.clip(vector[layout.exponents], *EXPONENT_PRIOR[2:])
+    vector[fit.layout.exponents] = np.clip(vector[fit.layout.exponents], *EXPONENT_PRIOR[2:])
     return replace(fit, vector=vector)
 
 
@@ -379,32 +382,28 @@ def left_out(
     for out in readings.groups:
         others, tested = without_group(fit, out), readings.taken(out)
         predicted[out] = others.friction(tested.at)
-        offsets = others.offsets.copy()
         rest = tested.force - tested.at.direction * predicted[out]
         if chamber_pressures is not None:
             rest = rest - chamber_pressures[out] @ others.areas
-        for source in set(tested.source.tolist()) - set(readings.source[~out].tolist()):
-            index = tested.two_sided[source]
-            side = tested.at.direction[index].astype(np.int64)
-            offsets[source] = half_range(rest[index], side, of_medians=False).offset if len(index) else 0.0
+        offsets = tested.offsets_with_own(others.offsets, rest, readings.source[~out])
         signed[out] = tested.at.direction * (rest - offsets[tested.source])
         vectors.append(others.vector)
     return predicted, signed, np.array(vectors)
 
 
-def _evidence(problem: _Problem, _: FloatArray, jacobian: FloatArray, left: FloatArray) -> float:
+def _evidence(problem: Problem, _: FloatArray, jacobian: FloatArray, left: FloatArray) -> float:
     """Logarithm of the probability of the readings by the method of Laplace, but for a constant."""
     determinant = float(np.linalg.slogdet(jacobian.T @ jacobian)[1])
     return -0.5 * float(left @ left) - 0.5 * determinant - float(np.log(problem.prior[:, 1]).sum())
 
 
-def _starts(problem: _Problem, layout: _Layout, told: Told) -> list[FloatArray]:
+def _starts(problem: Problem, layout: _Layout, told: Told) -> list[FloatArray]:
     start = np.zeros(layout.parameters)
     start[: layout.kinds + 1] = 1.0 / (layout.kinds + 1)
     start[layout.exponents] = EXPONENT_PRIOR[0]
     start[layout.kinds + 1 : layout.kinds + 3] = 0.1
     start[layout.speed] = STRIBECK_SPEED_PRIOR[0]
-    start[layout.asymmetry + 3 :] = offsets_by_half_range(problem.readings)[problem.sources] / problem.size
+    start[layout.asymmetry + 3 :] = problem.readings.offsets[problem.sources] / problem.size
     found = []
     for share in STARTS if told.stribeck else (0.3,):
         one = start.copy()
@@ -413,28 +412,6 @@ def _starts(problem: _Problem, layout: _Layout, told: Told) -> list[FloatArray]:
     return found
 
 
-def _model_fit(
-    problem: _Problem,
-    vector: FloatArray,
-    jacobian: FloatArray,
-    scatter: float,
-    left: FloatArray,
-    chamber_pressures: FloatArray | None,
-) -> ModelFit:
-    low, high = problem.prior[:, 2], problem.prior[:, 3]
-    highest = np.ones(2) if chamber_pressures is None else np.maximum(np.abs(chamber_pressures).max(axis=0), 1.0)
-    return ModelFit(
-        vector=vector,
-        covariance=np.asarray(np.linalg.inv(jacobian.T @ jacobian)),
-        columns=problem.columns,
-        size=problem.size,
-        speed=problem.speed,
-        at=problem.readings.at,
-        highest=highest,
-        sources=len(problem.readings.names),
-        scatter=scatter,
-        rows=jacobian[: problem.readings.count],
-        left=left[: problem.readings.count],
-        two_sided=problem.sources,
-        is_free=(vector > low + 1e-6 * (high - low)) & (vector < high - 1e-6 * (high - low)),
-    )
+def _model_fit(problem: Problem, vector: FloatArray, jacobian: FloatArray, left: FloatArray) -> ModelFit:
+    count = problem.readings.count
+    return ModelFit(problem, vector, np.asarray(np.linalg.inv(jacobian.T @ jacobian)), jacobian[:count], left[:count])

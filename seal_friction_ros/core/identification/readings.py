@@ -13,7 +13,7 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.foundation.units import BAR
-from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
+from seal_friction_ros.core.identification.candidate_laws import OperatingConditions, SealKind
 from seal_friction_ros.core.identification.signal_preparation import (
     LONGEST_GAP,
     HalfRange,
@@ -82,6 +82,9 @@ class FrictionReadings:
     """[s] time at rest before each breakaway, shape (n,); empty if unknown"""
     temperature: FloatArray = field(default_factory=lambda: np.empty(0))
     """[K] of each reading, shape (n,); empty if unknown"""
+    chamber_pressures: FloatArray = field(default_factory=lambda: np.empty(0))
+    """[Pa] of chambers a and b, shape (n, 2); empty for one kind of seals"""
+    kinds: tuple[SealKind, ...] = ()  # of the seals, in the order of the pressures; empty: one kind
     free_rod: FreeRod | None = None  # if the pressures are the effect of the friction, and tell nothing of it
 
     @property
@@ -123,6 +126,7 @@ class FrictionReadings:
             travel=self.travel[where] if len(self.travel) else self.travel,
             dwell=self.dwell[where] if len(self.dwell) else self.dwell,
             temperature=self.temperature[where] if len(self.temperature) else self.temperature,
+            chamber_pressures=self.chamber_pressures[where] if self.kinds else self.chamber_pressures,
         )
 
     @cached_property
@@ -159,6 +163,27 @@ class FrictionReadings:
             weights.append(len(index))
         friction, offset = np.average(np.array(found), axis=0, weights=weights)
         return HalfRange(float(friction), float(offset))
+
+    @cached_property
+    def offsets(self) -> FloatArray:
+        """Offset of the force sum of each source [N], in which friction cancels: mean over its pressures."""
+        found = np.zeros(len(self.names))
+        for source in np.unique(self.source):
+            parts = [inside & (self.source == source) for inside in self.levels.values()]
+            found[source] = np.mean([self.half_range(part).offset for part in parts if part.any()])
+        return found
+
+    def offsets_with_own(self, offsets: FloatArray, rest: FloatArray, known: IntArray) -> FloatArray:
+        """Offsets [N], shape (sources,), those of sources that are not ``known`` from the readings themselves.
+
+        ``rest`` is the force without friction [N], shape (n,); a source in one direction only has none.
+        """
+        found = offsets.copy()
+        for source in set(self.source.tolist()) - set(known.tolist()):
+            index = self.two_sided[source]
+            side = self.at.direction[index].astype(np.int64)
+            found[source] = half_range(rest[index], side, of_medians=False).offset if len(index) else 0.0
+        return found
 
     def frictions_of_sources(self, inside: BoolArray) -> dict[int, float]:
         """Source -> friction of its readings ``inside`` [N]."""

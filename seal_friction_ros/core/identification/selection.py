@@ -157,53 +157,85 @@ def _line(x: FloatArray, y: FloatArray, error: FloatArray) -> tuple[float, float
 
 @dataclass(frozen=True, eq=False)
 class LawScore:
-    """Fit and cross-validation of a law, or the reason why there are none."""
+    """Fit and cross-validation of a law."""
 
     law: CandidateLaw
-    fit: LawFit | None = None
-    validation: CrossValidation | None = None
-    losses: FloatArray | None = None
+    fit: LawFit
+    validation: CrossValidation
+    losses: FloatArray
     """in each group, and for swept logs in each stratum of speed and pressure and in each file [-]"""
-    why_not: str = ''
+
+    @property
+    def mean_loss(self) -> float:
+        """Mean loss over the groups [-]."""
+        return float(self.losses.mean())
+
+
+class NotScored(NamedTuple):
+    """A law that could not be fitted."""
+
+    law: CandidateLaw
+    why_not: str
+
+
+Scores = Sequence[LawScore | NotScored]
+
+
+def scored(scores: Scores) -> list[LawScore]:
+    """The laws that could be fitted.
+
+    Raises:
+        ValueError: There is none; with the reasons.
+    """
+    found = [score for score in scores if isinstance(score, LawScore)]
+    if not found:
+        reasons = '; '.join(f'{score.law.name}: {score.why_not}' for score in scores if isinstance(score, NotScored))
+        raise ValueError(f'no law could be fitted: {reasons}')
+    return found
 
 
 def score_ladder(
     laws: Sequence[CandidateLaw], readings: FrictionReadings, variation: Variation, tick: Ticks = lambda _: None
-) -> tuple[LawScore, ...]:
-    """Score every law, then the best law that depends on pressure again with velocity terms; from simple to complex."""
+) -> tuple[LawScore | NotScored, ...]:
+    """Score every law, then the best law that depends on pressure again with velocity terms; from simple to complex.
+
+    Several kinds of seals have the law of all terms alone.
+    """
+    if readings.kinds:
+        return score_laws([law_of_all_terms(variation, readings.kinds)], readings, tick)
     scores = score_laws(laws, readings, tick)
-    scored = [score for score in scores if score.losses is not None and score.law.depends_on_pressure]
-    if not scored:
+    rising = [score for score in scores if isinstance(score, LawScore) and score.law.depends_on_pressure]
+    if not rising:
         return (*scores, *score_laws([law_of_all_terms(variation)] * (variation.pressures == 0), readings, tick))
-    sound = [score for score in scored if score.fit is not None and not score.fit.why_unsound]
-    best = min(sound or scored, key=mean_loss)
+    sound = [score for score in rising if not score.fit.why_unsound]
+    best = min(sound or rising, key=_mean_loss)
     more = [*with_velocity_terms(best.law, variation), *[law_of_all_terms(variation)] * (variation.pressures == 3)]
     return (*scores, *score_laws(more, readings, tick))
 
 
 def score_laws(
     laws: Sequence[CandidateLaw], readings: FrictionReadings, tick: Ticks = lambda _: None
-) -> tuple[LawScore, ...]:
+) -> tuple[LawScore | NotScored, ...]:
     """Fit and cross-validate every law on readings of at least two groups.
 
     The laws go from simple to complex; results of simpler laws are start values for the others. ``tick`` is called with
     1 after each law.
     """
-    scores: list[LawScore] = []
+    scores: list[LawScore | NotScored] = []
     start_values: dict[str, float] = {}
     others = regroupings(readings)
     for law in laws:
         levels, count = len(readings.levels), len(law.parameters) - len(law.velocity_terms)
         needed = count + (readings.left_out_by == 'pressure')
         if not readings.are_samples and not law.has_prior and levels < needed:
-            scores.append(LawScore(law, why_not=f'{count} parameters need {needed} pressures, there are {levels}'))
+            scores.append(NotScored(law, f'{count} parameters need {needed} pressures, there are {levels}'))
         else:
             try:
                 found = fit(law, readings, start_values)
                 validation = cross_validate(law, readings, found.values)
                 more = [cross_validate(law, other, found.values).losses for other in others]
             except ValueError as error:
-                scores.append(LawScore(law, why_not=str(error)))
+                scores.append(NotScored(law, str(error)))
             else:
                 scores.append(LawScore(law, found, validation, np.concatenate((validation.losses, *more))))
                 start_values |= found.values
@@ -228,7 +260,7 @@ def regroupings(readings: FrictionReadings) -> list[FrictionReadings]:
     return [replace(readings, group=group) for group in groups]
 
 
-def recommended(scores: Sequence[LawScore], rise: Rise | None = None) -> LawScore:
+def recommended(scores: Scores, rise: Rise | None = None) -> LawScore:
     """The simplest law that the best law (smallest mean loss) does not beat.
 
     Laws whose parameters are at a bound or ill-conditioned only compete if no sound law is `NEAR`. Where friction rises
@@ -240,35 +272,28 @@ def recommended(scores: Sequence[LawScore], rise: Rise | None = None) -> LawScor
 
     Source: after the one-standard-error rule of [Breiman1984]_; the rest is our choice.
     """
-    scored = [score for score in scores if score.fit is not None and score.losses is not None]
-    if not scored:
-        reasons = '; '.join(f'{score.law.name}: {score.why_not}' for score in scores)
-        raise ValueError(f'no law could be fitted: {reasons}')
-    rising = [score for score in scored if score.law.depends_on_pressure or score.law.velocity_terms]
+    left = scored(scores)
+    rising = [score for score in left if score.law.depends_on_pressure or score.law.velocity_terms]
     if rise is not None and rise.is_significant and rising:
-        scored = rising
-    least = min(map(mean_loss, scored))
-    sound = [score for score in scored if score.fit is not None and not score.fit.why_unsound]
-    if sound and min(map(mean_loss, sound)) <= NEAR * least:
-        scored = sound
-    best = min(scored, key=mean_loss)
-    if best.law.has_prior and all(mean_loss(best) < (1.0 - BETTER) * mean_loss(s) for s in scored if s is not best):
+        left = rising
+    least = min(map(_mean_loss, left))
+    sound = [score for score in left if not score.fit.why_unsound]
+    if sound and min(map(_mean_loss, sound)) <= NEAR * least:
+        left = sound
+    best = min(left, key=_mean_loss)
+    if best.law.has_prior and all(
+        best.mean_loss < (1.0 - BETTER) * other.mean_loss for other in left if other is not best
+    ):
         return best
-    scored = [score for score in scored if not score.law.has_prior] or scored
-    best = min(scored, key=mean_loss)
-    left = [score for score in scored if not is_beaten(losses_of(score), losses_of(best), many_times=rise is None)]
+    left = [score for score in left if not score.law.has_prior] or left
+    best = min(left, key=_mean_loss)
+    left = [score for score in left if not is_beaten(score.losses, best.losses, many_times=rise is None)]
     fewest = min(len(score.law.parameters) for score in left)
-    return min((score for score in left if len(score.law.parameters) == fewest), key=mean_loss)
+    return min((score for score in left if len(score.law.parameters) == fewest), key=_mean_loss)
 
 
-def losses_of(score: LawScore) -> FloatArray:
-    """Losses of a law [-], as `LawScore.losses`; empty if it was not scored."""
-    return np.zeros(0) if score.losses is None else score.losses
-
-
-def mean_loss(score: LawScore) -> float:
-    """Mean loss of a scored law over the groups [-]."""
-    return float(losses_of(score).mean())
+def _mean_loss(score: LawScore) -> float:
+    return score.mean_loss
 
 
 def is_beaten(losses: FloatArray, others: FloatArray, *, many_times: bool = False) -> bool:
@@ -337,11 +362,11 @@ def choose_without(
         chosen = choose(others)
     except ValueError:
         return LeftOut(np.full(left_out.count, np.nan), '')
-    _, predicted, _ = predict(chosen.law, others, left_out, chosen.fit.values if chosen.fit else {})
+    _, predicted, _ = predict(chosen.law, others, left_out, chosen.fit.values)
     return LeftOut(predicted, chosen.law.name)
 
 
-def collinear_spread(scores: Sequence[LawScore], selected: LawFit, readings: FrictionReadings) -> float:
+def collinear_spread(scores: Scores, selected: LawFit, readings: FrictionReadings) -> float:
     """Relative spread of laws that fit nearly as well, where speed and pressure part [-]: the data cannot tell them.
 
     Sound laws within `NEAR` of the best are compared at every pair of a speed and a pressure (quartiles of each), also
@@ -350,9 +375,9 @@ def collinear_spread(scores: Sequence[LawScore], selected: LawFit, readings: Fri
     """
     if not readings.are_samples:
         return 0.0
-    least = min(mean_loss(score) for score in scores if score.losses is not None)
-    fits = [score.fit for score in scores if score.losses is not None and mean_loss(score) <= NEAR * least]
-    near = [found for found in fits if found is not None and not found.why_unsound]
+    fitted = scored(scores)
+    least = min(map(_mean_loss, fitted))
+    near = [score.fit for score in fitted if score.mean_loss <= NEAR * least and not score.fit.why_unsound]
     shares = (0.125, 0.375, 0.625, 0.875)
     speeds = np.quantile(np.abs(readings.at.velocity), shares)
     order = np.argsort(readings.seal_pressure)

@@ -71,7 +71,7 @@ def fit_temperature(readings: FrictionReadings) -> TemperatureFit | None:
         return refused(
             f'temperature varied by {high - low:.3g} K, {LEAST_SPAN:.0f} K are needed: repeat at other temperatures'
         )
-    measured = readings.magnitudes(_offsets(readings))
+    measured = readings.magnitudes(readings.offsets)
     if readings.count < FEWEST_READINGS or float(measured.min()) <= 0.0:
         return refused('too few readings, or friction near zero: record more strokes at each temperature')
     run, part, across = _runs(readings)
@@ -103,27 +103,10 @@ def at_reference(readings: FrictionReadings, found: TemperatureFit) -> FrictionR
     """Readings as they would have been at the reference temperature; offsets of the force sum stay."""
     law = found.scale
     share = 1.0 / np.array([scale_at(law, one) for one in readings.temperature.tolist()])
-    offset = _offsets(readings)[readings.source]
+    offset = readings.offsets[readings.source]
     rows = zip(readings.samples, offset.tolist(), share.tolist(), strict=True) if readings.samples else ()
     samples = tuple(zero + one * (part - zero) for part, zero, one in rows)
     return replace(readings, force=offset + share * (readings.force - offset), samples=samples)
-
-
-def _offsets(readings: FrictionReadings) -> FloatArray:
-    """Offset of the force sum of each source [N], in which friction cancels: mean over its pressures."""
-    return np.array(
-        [
-            np.mean(
-                [
-                    readings.half_range(inside & (readings.source == source)).offset
-                    for inside in readings.levels.values()
-                    if (inside & (readings.source == source)).any()
-                ]
-                or [0.0]
-            )
-            for source in range(len(readings.names))
-        ]
-    )
 
 
 def _runs(readings: FrictionReadings) -> tuple[IntArray, IntArray, bool]:

@@ -19,7 +19,6 @@ from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, P
 from seal_friction_ros.core.identification.fitting import fit, offsets_of, root_mean_square, values_of_model
 from seal_friction_ros.core.identification.friction_model import ModelFit
 from seal_friction_ros.core.identification.readings import FrictionReadings
-from seal_friction_ros.core.identification.signal_preparation import half_range
 
 Ticks = Callable[[int], None]
 
@@ -88,11 +87,7 @@ def predict(
     found = fit(law, trained, near, is_close=True)
     friction = found.friction(tested.at)
     signed = tested.force - tested.at.direction * friction
-    offsets = found.offsets.copy()
-    for source in set(range(len(tested.names))) - set(trained.source.tolist()):
-        index = tested.two_sided[source]
-        direction = tested.at.direction[index].astype(np.int64)
-        offsets[source] = half_range(signed[index], direction, of_medians=False).offset if len(index) else 0.0
+    offsets = tested.offsets_with_own(found.offsets, signed, trained.source)
     return found.values, friction, tested.magnitudes(offsets) - friction
 
 

@@ -2,10 +2,13 @@
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from seal_friction_ros.offline.commands import command_line as cli
 from seal_friction_ros.offline.work.targets import DATA_SHEET, SEAL_FILE, mark
+
+if TYPE_CHECKING:
+    from seal_friction_ros.offline.identification.results import Identification
 
 
 def add_parser(commands: Any) -> None:
@@ -21,8 +24,10 @@ def add_parser(commands: Any) -> None:
     parser.add_argument('sources', type=cli.place, nargs='+', metavar='SOURCE', help=text)
     cli.add_target(parser, '--out', SEAL_FILE, required=True, metavar='SEAL.yaml', help='seal file to write')
     cli.add_page(parser, '--report', required=False)
-    text = 'data sheet of the pressures and speeds that would make the law certain; a page goes beside it'
-    cli.add_target(parser, '--next', DATA_SHEET, metavar='SHEET.csv', help=text)
+    cli.add_target(
+        parser, '--next', DATA_SHEET, metavar='SHEET.csv',
+        help='data sheet of the pressures and speeds that would make the law certain; a page goes beside it',
+    )  # fmt: skip
     cli.add_file(parser, '--rig', 'rigs', 'rig file of the logs')
     cli.add_file(parser, '--seal', 'seals', 'seal file with the geometry of the ring')
     cli.add_options(parser, _WHAT_IS_KNOWN)
@@ -69,94 +74,95 @@ _WHAT_IS_KNOWN: dict[str, tuple[str, cli.Settings]] = {
 }  # fmt: skip
 """what is known of the seals, and how they are fitted"""
 
-NOT_FOR_KINDS = (
-    'seal', 'squeeze_force', 'chambers', 'law', 'refuse_changed', 'presliding', 'workers',
-    'scheduler', 'work',
-)  # fmt: skip
-"""options that several kinds of seals do not take"""
+NOT_FOR_KINDS = {'seal': 'seal', 'squeeze_force': 'squeeze-force', 'chambers': 'seal-chambers'}
+"""Options of one kind of seals: field and name."""
 
 
-def _run_kinds(arguments: argparse.Namespace) -> int:
-    """Identify several kinds of seals together, and write a seal file for each."""
-    from seal_friction_ros.core.identification.several_kinds import LARGEST_KIND_ERROR, SealKind
-    from seal_friction_ros.offline.identification import kinds
-    from seal_friction_ros.offline.identification.data_sheet import write_new_csv
-    from seal_friction_ros.offline.work.seal_writer import write_seal
-    from seal_friction_ros.offline.work.targets import checked_targets
+def _kinds(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Options of several kinds of seals.
 
-    given = [option for option in NOT_FOR_KINDS if getattr(arguments, option)]
+    Raises:
+        ValueError: There is one, two have the same name, or an option is of one kind.
+    """
+    from seal_friction_ros.core.identification.candidate_laws import SealKind
+
+    error, names = arguments.largest_kind_error, [name for name, _ in arguments.kinds or ()]
+    if not names:
+        if error is not None:
+            raise ValueError('--largest-kind-error is for several kinds of seals: give them with --seal-kind')
+        return {'kinds': ()}
+    given = [option for field, option in NOT_FOR_KINDS.items() if getattr(arguments, field)]
     if given:
-        option = {'chambers': 'seal_chambers'}.get(given[0], given[0]).replace('_', '-')
-        raise ValueError(f'--{option} is for one kind of seals: leave it out, or leave out --seal-kind')
-    names = [name for name, _ in arguments.kinds]
+        raise ValueError(f'--{given[0]} is for one kind of seals: leave it out, or leave out --seal-kind')
     if len(names) < 2 or len({*names}) < len(names):
         raise ValueError(f'--seal-kind {", ".join(names)}: give two kinds at least, with different names')
-    files = kinds.seal_files(arguments.out, names)
-    targets = [(path, SEAL_FILE) for path in files.values()]
-    paths = [one for one in arguments.sources if isinstance(one, Path)]
-    with checked_targets('identify', targets, paths, force=arguments.force):
-        each = [SealKind(*kind) for kind in arguments.kinds]
-        name, error = arguments.name or arguments.out.stem, arguments.largest_kind_error
-        accepted = LARGEST_KIND_ERROR if error is None else error
-        options = _source_options(arguments)
-        result = kinds.identify_kinds(arguments.sources, options, each, name, arguments.run_to_run, accepted)
-        for kind, path in files.items():
-            write_seal(result.documents[kind], path, f'Seal file, {mark("identify")}.')
-        written: dict[str, Any] = {}
-        if arguments.report:
-            from seal_friction_ros.offline.reports.kinds_report import write_kinds_report
-
-            figures = write_kinds_report(result, files, arguments.report)
-            written = {'report': arguments.report, 'figures': figures}
-        if arguments.next:
-            write_new_csv(kinds.next_runs_text(result), arguments.next)
-            written |= {'sheet': arguments.next}
-    numbers = kinds.kinds_numbers(result) | {'seal_files': {kind: str(path) for kind, path in files.items()}} | written
-    names_written = ', '.join(map(str, files.values()))
-    return cli.print_result(arguments, numbers, f'{kinds.kinds_summary(result)}\n{names_written}: written')
+    kinds = tuple(SealKind(*kind) for kind in arguments.kinds)
+    return {'kinds': kinds} | ({} if error is None else {'largest_kind_error': error})
 
 
-def _source_options(arguments: argparse.Namespace) -> Any:
+def _of_sources(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Options of the sources."""
     from seal_friction_ros.offline.identification.sources import SourceOptions
 
-    return SourceOptions(**{**cli.options_from(arguments, SourceOptions), 'mapping': cli.mapping_of(arguments)})
+    return {**cli.options_from(arguments, SourceOptions), 'mapping': cli.mapping_of(arguments)}
+
+
+def _seal_files(arguments: argparse.Namespace) -> dict[str, Path]:
+    """Kind -> its seal file: the name of one of several kinds is added to that of ``--out``."""
+    out, names = arguments.out, [name for name, _ in arguments.kinds or ()]
+    return {name: out.with_name(f'{out.stem}_{name}{out.suffix}') for name in names} or {'': out}
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Identify, and write seal file, page and data sheet."""
-    if arguments.kinds:
-        return _run_kinds(arguments)
-    if arguments.largest_kind_error is not None:
-        raise ValueError('--largest-kind-error is for several kinds of seals: give them with --seal-kind')
-    from seal_friction_ros.offline.identification import next_readings
+    """Identify, and write seal files, page and data sheet."""
     from seal_friction_ros.offline.identification.pipeline import IdentifyOptions, identify
     from seal_friction_ros.offline.identification.results import identification_numbers
+    from seal_friction_ros.offline.identification.sources import SourceOptions
     from seal_friction_ros.offline.identification.wording import summary
     from seal_friction_ros.offline.work.seal_writer import write_seal
+    from seal_friction_ros.offline.work.targets import checked_targets
 
+    kinds, files = _kinds(arguments), _seal_files(arguments)
     if arguments.next and arguments.report and arguments.next.with_suffix('.html') == arguments.report:
         raise ValueError(f'{arguments.report}: --next writes its page there: choose another name for one of them')
-    known = cli.options_from(arguments, IdentifyOptions)
-    options = IdentifyOptions(**{**known, 'sources': _source_options(arguments)})
-    workers = cli.workers_of(arguments)
-    found = identify(arguments.sources, options, arguments.out.stem, workers, arguments.work)
-    design = next_readings.design_for(found) if arguments.next else None
-    written: dict[str, Any] = {'seal_file': arguments.out}
-    if arguments.report:
-        from seal_friction_ros.offline.reports.identification_report import write_identification_report
+    others = {name: value for name, value in cli.options_from(arguments, IdentifyOptions).items() if 'kind' not in name}
+    options = IdentifyOptions(**{**others, **kinds, 'sources': SourceOptions(**_of_sources(arguments))})
+    paths = [one for one in arguments.sources if isinstance(one, Path)]
+    targets = [(path, SEAL_FILE) for path in files.values()]
+    with checked_targets('identify', targets, paths, force=arguments.force):
+        workers = cli.workers_of(arguments)
+        found = identify(arguments.sources, options, arguments.out.stem, workers, arguments.work)
+        written: dict[str, Any] = {'seal_file': arguments.out}
+        if kinds['kinds']:
+            written = {'seal_files': {kind: str(path) for kind, path in files.items()}}
+        if arguments.report:
+            from seal_friction_ros.offline.reports.identification_report import write_identification_report
 
-        figures = write_identification_report(found, arguments.report)
-        written |= {'report': arguments.report, 'figures': figures}
-    write_seal(found.document, arguments.out, f'Seal file, {mark("identify")}.')
-    numbers, text = identification_numbers(found), summary(found)
-    if design is not None:
-        from seal_friction_ros.offline.identification.data_sheet import write_sheet
-        from seal_friction_ros.offline.reports.data_sheet_page import write_data_sheet_page
+            figures = write_identification_report(found, arguments.report, files)
+            written |= {'report': arguments.report, 'figures': figures}
+        for kind, path in files.items():
+            write_seal(found.documents[kind], path, f'Seal file, {mark("identify")}.')
+        sheet, more, texts = _next(arguments, found)
+    if kinds['kinds']:
+        texts = [*texts, f'{", ".join(map(str, files.values()))}: written']
+    numbers = identification_numbers(found) | more | written | sheet
+    return cli.print_result(arguments, numbers, '\n'.join([summary(found), *texts]))
 
-        plan, page = next_readings.plan_of(found, design), arguments.next.with_suffix('.html')
-        write_sheet(plan, arguments.next)
-        write_data_sheet_page(plan, page, 'identify')
-        written |= {'sheet': arguments.next, 'sheet_page': page}
-        numbers |= next_readings.numbers_of(design)
-        text = '\n'.join([text, *(f'next: {line}' for line in next_readings.texts_of(found, design))])
-    return cli.print_result(arguments, numbers | written, text)
+
+def _next(arguments: argparse.Namespace, found: 'Identification') -> tuple[dict[str, Any], dict[str, Any], list[str]]:
+    """Write the sheet of ``--next``: its paths and numbers for JSON, and lines for a person."""
+    from seal_friction_ros.offline.identification import next_readings
+    from seal_friction_ros.offline.identification.data_sheet import write_new_csv, write_sheet
+    from seal_friction_ros.offline.reports.data_sheet_page import write_data_sheet_page
+
+    if not arguments.next:
+        return {}, {}, []
+    if found.data.used.kinds:
+        write_new_csv(next_readings.kinds_sheet(found), arguments.next)
+        return {'sheet': arguments.next}, {}, []
+    design = next_readings.design_for(found)
+    plan, page = next_readings.plan_of(found, design), arguments.next.with_suffix('.html')
+    write_sheet(plan, arguments.next)
+    write_data_sheet_page(plan, page, 'identify')
+    texts = [f'next: {line}' for line in next_readings.texts_of(found, design)]
+    return {'sheet': arguments.next, 'sheet_page': page}, next_readings.numbers_of(design), texts

@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 
 from seal_friction_ros.core.identification.load_over_position import LoadOverPosition, load_at
-from seal_friction_ros.offline.work.seal_writer import rounded
+from seal_friction_ros.offline.work.seal_writer import rounded_numbers
 
-DIGITS = 6
 POINTS = 21  # equally spaced positions at which the load is given (our choice)
 
 
@@ -26,26 +25,25 @@ def load_numbers(loads: Sequence[tuple[str, LoadOverPosition | None]]) -> dict[s
 def _one(name: str, load: LoadOverPosition) -> dict[str, Any]:
     position = np.linspace(load.knots[0], load.knots[-1], POINTS)
     position[-1] = load.knots[-1]
-    return {
-        'source': name,
-        'position_m': _rounded(position),
-        'force_N': _rounded(load_at(load, position)),
-        'std_N': _rounded(np.interp(position, load.knots, load.std)),
-        'mass_kg': rounded(load.mass, DIGITS),
-        'mass_std_kg': rounded(load.mass_std, DIGITS),
-        'mass_change_kg_per_m': [rounded(value, DIGITS) for value in load.mass_change],
-        'noise_N': rounded(load.noise, DIGITS),
-        'strokes': load.strokes,
-        'condition_number': rounded(load.condition_number, DIGITS),
-        'friction_N': rounded(load.friction.mean, DIGITS),
-        'friction_standard_error_N': rounded(load.friction.standard_error, DIGITS),
-        'friction_terms': dict(zip(load.friction.names, _rounded(load.friction.values), strict=True)),
-        'warnings': list(load.warnings),
-    }
-
-
-def _rounded(values: Any) -> list[float]:
-    return [rounded(float(value), DIGITS) for value in values]
+    numbers: dict[str, Any] = rounded_numbers(
+        {
+            'source': name,
+            'position_m': position,
+            'force_N': load_at(load, position),
+            'std_N': np.interp(position, load.knots, load.std),
+            'mass_kg': load.mass,
+            'mass_std_kg': load.mass_std,
+            'mass_change_kg_per_m': load.mass_change,
+            'noise_N': load.noise,
+            'strokes': load.strokes,
+            'condition_number': load.condition_number,
+            'friction_N': load.friction.mean,
+            'friction_standard_error_N': load.friction.standard_error,
+            'friction_terms': dict(zip(load.friction.names, load.friction.values.tolist(), strict=True)),
+            'warnings': load.warnings,
+        }
+    )
+    return numbers
 
 
 def load_text(load: LoadOverPosition) -> str:

@@ -1,8 +1,9 @@
 """Next readings of an identification: the design, as a data sheet, as numbers for JSON, and in words."""
 
-import math
 from collections.abc import Iterator
 from typing import Any
+
+import numpy as np
 
 from seal_friction_ros.core.foundation.units import BAR, MM
 from seal_friction_ros.core.identification.experiment_design import (
@@ -13,8 +14,10 @@ from seal_friction_ros.core.identification.experiment_design import (
     ExperimentDesign,
     design_experiment,
 )
+from seal_friction_ros.core.identification.seal_kinds import moved_together, proposed_conditions
 from seal_friction_ros.offline.identification.data_sheet import FrictionTestPlan
-from seal_friction_ros.offline.identification.results import Identification, rounded_value
+from seal_friction_ros.offline.identification.results import Identification
+from seal_friction_ros.offline.work.seal_writer import rounded, rounded_numbers
 
 LIMITS = {
     RUN_TO_RUN: 'the spread from run to run',
@@ -34,7 +37,7 @@ def design_for(found: Identification) -> ExperimentDesign:
 
 def plan_of(found: Identification, design: ExperimentDesign) -> FrictionTestPlan:
     """Data sheet of the proposed readings, sorted by pressure and speed, in bar, mm/s and N."""
-    points = [(rounded_value(r.pressure / BAR), rounded_value(r.speed / MM)) for r in design.readings]
+    points = [(rounded(r.pressure / BAR, 6), rounded(r.speed / MM, 6)) for r in design.readings]
     name = str(found.document['name']).replace(',', ' ')
     ring = found.data.ring
     return FrictionTestPlan.at_points(
@@ -53,39 +56,58 @@ def plan_of(found: Identification, design: ExperimentDesign) -> FrictionTestPlan
 def numbers_of(design: ExperimentDesign) -> dict[str, Any]:
     """Numbers for JSON: ``next``, the readings in the order of their use, and ``next_effect``."""
     before, after = design.correlation_before, design.correlation_after
-    pair = before and after and {'parameters': [before.one, before.other], 'before': _rounded(before.correlation),
-                                 'after': _rounded(after.correlation)}  # fmt: skip
-    return {
-        'next': [
-            {
-                'pressure_Pa': rounded_value(r.pressure),
-                'speed_m_per_s': rounded_value(r.speed),
-                'directions': list(r.directions),
-                'shrink': _rounded(r.shrink),
-                'disagreement': _rounded(r.disagreement),
-                'is_repeated': r.is_repeated,
-            }
-            for r in design.readings
-        ],
-        'next_effect': {
-            'law': design.law.name,
-            'limit': design.limit,
-            'parts': {part: _rounded(value) for part, value in design.parts.items()},
-            'error_before': _rounded(design.error_before),
-            'error_after': _rounded(design.error_after),
-            'shrink': _rounded(design.shrink),
-            'pressures_Pa': [rounded_value(p) for p in design.pressures],
-            'speeds_m_per_s': [rounded_value(v) for v in design.speeds],
-            'correlation': pair,
-            'condition_number_before': _rounded(design.condition_before),
-            'condition_number_after': _rounded(design.condition_after),
-            'another_run': design.repeated and design.repeated._asdict(),
-        },
-    }
+    pair = before and after and {'parameters': [before.one, before.other], 'before': before.correlation,
+                                 'after': after.correlation}  # fmt: skip
+    numbers: dict[str, Any] = rounded_numbers(
+        {
+            'next': [
+                {
+                    'pressure_Pa': r.pressure,
+                    'speed_m_per_s': r.speed,
+                    'directions': r.directions,
+                    'shrink': r.shrink,
+                    'disagreement': r.disagreement,
+                    'is_repeated': r.is_repeated,
+                }
+                for r in design.readings
+            ],
+            'next_effect': {
+                'law': design.law.name,
+                'limit': design.limit,
+                'parts': design.parts,
+                'error_before': design.error_before,
+                'error_after': design.error_after,
+                'shrink': design.shrink,
+                'pressures_Pa': design.pressures,
+                'speeds_m_per_s': design.speeds,
+                'correlation': pair,
+                'condition_number_before': design.condition_before,
+                'condition_number_after': design.condition_after,
+            },
+        }
+    )
+    numbers['next_effect']['another_run'] = design.repeated and design.repeated._asdict()
+    return numbers
 
 
-def _rounded(value: float) -> float | None:
-    return rounded_value(value) if math.isfinite(value) else None
+def kinds_sheet(found: Identification) -> str:
+    """CSV of the chamber pressures to drive next, one row each, at the mean speed of the readings.
+
+    A log holds the readings of several kinds of seals, so the rows are driven while recording; nothing is filled in.
+    """
+    readings = found.data.used
+    conditions, correlation = proposed_conditions(readings, found.selection.fit.model)
+    before = float(moved_together(readings).max())
+    speed = float(np.nan_to_num(np.abs(readings.at.velocity)).mean()) / MM
+    lines = [
+        '# Next runs of a cylinder with several kinds of seals: hold both pressures, drive ten strokes in each',
+        '# direction, and record each row; then give these and all earlier logs to identify.',
+        f'# Correlation of the pressures of the kinds: {before:.2f} now, {min(correlation, before):.2f} with these.',
+    ]
+    if not conditions:
+        lines.append('# The pressures tell the kinds apart as well as this cylinder can: repeat runs on another day.')
+    rows = [f'{c.a / BAR:.6g},{c.b / BAR:.6g},{speed:.3g}' for c in conditions]
+    return '\n'.join([*lines, 'pressure_a_bar,pressure_b_bar,speed_mm_per_s', *rows]) + '\n'
 
 
 def _percent(share: float) -> str:

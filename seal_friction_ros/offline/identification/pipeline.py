@@ -26,20 +26,32 @@ from seal_friction_ros.core.identification.breakaway import BreakawayFit, fit_br
 from seal_friction_ros.core.identification.calibration import calibration
 from seal_friction_ros.core.identification.candidate_laws import (
     CandidateLaw,
+    SealKind,
     candidate_laws,
     normal_forces,
 )
-from seal_friction_ros.core.identification.force_correction import force_correction
+from seal_friction_ros.core.identification.force_correction import ForceCorrection, force_correction
+from seal_friction_ros.core.identification.friction_model import Told
 from seal_friction_ros.core.identification.prepare_readings import with_predictable_groups
-from seal_friction_ros.core.identification.readings import FrictionReadings
+from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
+from seal_friction_ros.core.identification.seal_kinds import (
+    LARGEST_KIND_ERROR,
+    AreaErrors,
+    ToldApart,
+    area_errors,
+    check_kinds,
+    check_told_apart,
+    kinds_readings,
+    told_apart,
+)
 from seal_friction_ros.core.identification.selection import (
     WORTHWHILE,
     ChosenAnew,
     LawScore,
     LeftOut,
+    NotScored,
     choose_anew,
     collinear_spread,
-    mean_loss,
     recommended,
     rise_over_pressures,
     score_ladder,
@@ -57,15 +69,16 @@ from seal_friction_ros.offline.identification.results import (
     PressureLevel,
     Ring,
     identification_section,
-    rounded_value,
+    kind_section,
     seal_document,
 )
 from seal_friction_ros.offline.identification.sources import SourceOptions, Sources, read_sources
-from seal_friction_ros.offline.identification.wording import remarks_on, warnings_of
+from seal_friction_ros.offline.identification.wording import kinds_warnings, remarks_on, warnings_of
 from seal_friction_ros.offline.work.executor import Workers
 from seal_friction_ros.offline.work.finished_parts import Part, content_of, part_key, run_parts
 from seal_friction_ros.offline.work.places import Place
 from seal_friction_ros.offline.work.progress import progress
+from seal_friction_ros.offline.work.seal_writer import rounded_numbers
 
 MOST_EXTENSIONS = 4  # of a law by velocity terms, and the law of all terms
 FEWEST_TO_COMPARE = 4  # pressures by which the settled seal is compared with the readings as measured (our choice)
@@ -78,6 +91,8 @@ class IdentifyOptions:
     """Options of an identification."""
 
     sources: SourceOptions = field(default_factory=SourceOptions)
+    kinds: tuple[SealKind, ...] = ()  # of the seals, if there are several; their chambers are those of the sources
+    largest_kind_error: float = LARGEST_KIND_ERROR  # share of its friction up to which a kind is told apart [-]
     seal: str | None = None
     """seal file with the geometry of the ring and its normal force: a path, or the name of one in config/seals"""
     squeeze_force: bool = False  # compute the normal force from the geometry, even if the seal file has one
@@ -109,16 +124,26 @@ def identify(
     elastic = identify_presliding(data.sources) if options.presliding else None
     selection = select_law(data, options.law, workers, work)
     _check_one_seal(diagnostics.swept_logs_compared(data.used, selection.fit), options.refuse_changed)
-    quality = assess(data, selection, options.run_to_run)
-    as_measured = seal_document(data, selection, quality, options.name or name, presliding=elastic)
-    levels = _levels(data, selection, quality, as_measured)
-    document = as_measured
-    if selection.settled is not None:
-        document = seal_document(data, selection, quality, options.name or name, selection.settled, elastic)
-    warnings = tuple(warnings_of(data, selection, quality, levels))
+    told = _told_apart(data, selection, options.largest_kind_error)
+    quality = assess(data, selection, options.run_to_run, told)
+
+    def documents(settled: run_in.SettledLaw | None) -> dict[str, dict[str, Any]]:
+        """Seal file of each kind."""
+        names = {kind.name: '_'.join(filter(None, (options.name or name, kind.name))) for kind in data.kinds}
+        return {
+            kind.name: seal_document(data, selection, quality, names[kind.name], number, settled, elastic)
+            for number, kind in enumerate(data.kinds)
+        }
+
+    as_measured = documents(None)
+    levels = _levels(data, selection, quality, mounted_seals(as_measured))
+    found = as_measured if selection.settled is None else documents(selection.settled)
+    warnings = (*warnings_of(data, selection, quality, levels), *kinds_warnings(data, selection, quality))
     remarks = (*data.sources.remarks, *remarks_on(data, selection))
-    document['identification'] = identification_section(data, selection, quality, levels, warnings, elastic)
-    return Identification(data, selection, quality, levels, document, as_measured, warnings, remarks, elastic)
+    for number, document in enumerate(found.values()):
+        section = identification_section(data, selection, quality, levels, warnings, elastic)
+        document['identification'] = section | kind_section(data, quality, number)
+    return Identification(data, selection, quality, levels, found, as_measured, warnings, remarks, elastic)
 
 
 def gather(paths: Sequence[Place], options: IdentifyOptions, workers: Workers = 1) -> IdentificationData:
@@ -127,16 +152,19 @@ def gather(paths: Sequence[Place], options: IdentifyOptions, workers: Workers = 
     Arguments are those of `identify`.
 
     Raises:
-        ValueError: The data are unfit for identification.
+        ValueError: The data are unfit for identification, or do not tell the kinds of seals apart.
     """
-    sources = read_sources(paths, options.sources, workers)
+    of_sources, kinds = options.sources, options.kinds
+    if kinds:
+        of_sources = replace(of_sources, chambers=tuple(chamber for kind in kinds for chamber in kind.chambers))
+    sources = read_sources(paths, of_sources, workers)
     ring = _ring(sources, options)
-    prepared = sources.prepare()
+    prepared = _prepared(sources, kinds)
     _check_one_seal(diagnostics.shared_levels(prepared.readings), options.refuse_changed)
-    correction = force_correction(prepared)
+    correction = _force_correction(prepared, sources.has_fitted_load)
     if correction is not None and correction.is_significant:
         sources = sources.corrected(correction)
-        prepared = sources.prepare()
+        prepared = _prepared(sources, kinds)
     warmth = fit_temperature(prepared.readings)
     if warmth is not None and not warmth.why_not:
         breakaway = prepared.breakaway
@@ -146,7 +174,7 @@ def gather(paths: Sequence[Place], options: IdentifyOptions, workers: Workers = 
         )
     readings = _with_normal_force(prepared.readings, ring)
     outlier = None
-    if not readings.are_samples and len(readings.levels) >= 4:
+    if not readings.are_samples and not kinds and len(readings.levels) >= 4:
         laws = _power_laws(readings)
         offsets = fitting.fit(laws[0], readings).offsets
         floor = diagnostics.repeatability(readings, offsets)
@@ -155,6 +183,53 @@ def gather(paths: Sequence[Place], options: IdentifyOptions, workers: Workers = 
     if outlier is not None:
         used = readings.without(readings.level == outlier.level)
     return IdentificationData(sources, prepared._replace(readings=readings), used, ring, outlier, correction, warmth)
+
+
+def _prepared(sources: Sources, kinds: tuple[SealKind, ...]) -> PreparedReadings:
+    """Readings of all sources; of several kinds of seals with those that tell them apart.
+
+    Raises:
+        ValueError: They are unfit for identification.
+    """
+    prepared = sources.prepare()
+    if not kinds:
+        return prepared
+    where = ', '.join(prepared.readings.names)
+    if any(source.log is None for source in sources.each):
+        raise ValueError(
+            f'{where}: a table of readings has one pressure, several kinds of seals need those of both chambers: '
+            'give bags or logs'
+        )
+    if prepared.readings.free_rod is not None:
+        raise ValueError(
+            f'{where}: nothing but friction loads the rod, so the pressures are the effect of the friction and '
+            'tell no kinds apart: load the rod and record the load, or drive with several supply or return pressures'
+        )
+    readings = kinds_readings(prepared.readings, prepared.chamber_pressures, kinds)
+    check_kinds(readings)
+    return prepared._replace(readings=readings)
+
+
+def _force_correction(prepared: PreparedReadings, has_fitted_load: bool) -> ForceCorrection | AreaErrors | None:
+    if not prepared.readings.kinds:
+        return force_correction(prepared)
+    variation = variation_of(prepared.readings)
+    speeds, asymmetry = variation.speeds, variation.asymmetry and not has_fitted_load
+    return area_errors(prepared.readings, Told(speeds, speeds, asymmetry, areas=True))
+
+
+def _told_apart(data: IdentificationData, selection: LawSelection, largest_error: float) -> ToldApart | None:
+    """How well the kinds of seals are told apart; None for one kind.
+
+    Raises:
+        ValueError: One is told worse than within ``largest_error``.
+    """
+    model = selection.fit.model
+    if not data.used.kinds or model is None:
+        return None
+    found = told_apart(model, data.used)
+    check_told_apart(found, model, data.used, largest_error)
+    return found
 
 
 def _power_laws(readings: FrictionReadings) -> tuple[CandidateLaw, ...]:
@@ -175,7 +250,7 @@ def _ring(sources: Sources, options: IdentifyOptions) -> Ring | None:
     normal_force = document.get('normal_force')
     if not isinstance(normal_force, Mapping) or options.squeeze_force:
         gain = read_yaml(config_path('seals', REFERENCE_SEAL))['normal_force']['area_deformation_gain']
-        force = rounded_value(squeeze_force(geometry))
+        force = rounded_numbers(squeeze_force(geometry))
         normal_force = {'law': 'area_deformation_gain', 'area_deformation_gain': gain, 'radial_force': force}
     return Ring(geometry, parse_part(NormalForceLaw, {'normal_force': normal_force}, 'seal'))
 
@@ -228,15 +303,16 @@ def select_law(
     if settled is not None and len(data.used.levels) >= FEWEST_TO_COMPARE:
         of_settled = _scored(settled.readings, data.ring, data.sources.has_fitted_load)
         best_settled = recommended(of_settled, rise_over_pressures(settled.readings))
-        if mean_loss(best_settled) <= (1.0 + WORTHWHILE) * mean_loss(best):
+        if best_settled.mean_loss <= (1.0 + WORTHWHILE) * best.mean_loss:
             scores, best, (readings, share, _) = of_settled, best_settled, settled
         else:
             settled, is_no_run_in = None, True
-    by_name = {None: best} | {score.law.name: score for score in scores}
+    by_name: dict[str | None, LawScore | NotScored] = {score.law.name: score for score in scores}
+    by_name[None] = best
     if name not in by_name:
-        raise ValueError(f'law {name!r} is not one of {", ".join(score.law.name for score in scores)}')
+        raise ValueError(f'--law {name!r} is not one of {", ".join(score.law.name for score in scores)}')
     selected = by_name[name]
-    if selected.fit is None or selected.validation is None:
+    if isinstance(selected, NotScored):
         raise ValueError(f'law {name} was not fitted: {selected.why_not}')
     if not selected.validation.error <= LARGEST_ERROR:
         raise ValueError(
@@ -267,8 +343,6 @@ def select_law(
 
 def _settled(data: IdentificationData, best: LawScore) -> run_in.SettledReadings | None:
     """Readings of the settled seal; None if no drift is evident. The ``best`` law tells the offset of the force sum."""
-    if best.fit is None:
-        return None
     return run_in.settled_readings(data.used, fitting.offsets_of(data.used, best.fit.friction(data.used.at)))
 
 
@@ -298,7 +372,7 @@ def _recommended(readings: FrictionReadings, ring: Ring | None, has_fitted_load:
 
 def _scored(
     readings: FrictionReadings, ring: Ring | None, has_fitted_load: bool, tick: validation.Ticks = lambda _: None
-) -> tuple[LawScore, ...]:
+) -> tuple[LawScore | NotScored, ...]:
     """Scores of the ladder on some of the readings."""
     variation = variation_of(readings)
     if has_fitted_load:  # asymmetry is not identifiable: the fitted load holds it
@@ -306,8 +380,10 @@ def _scored(
     return score_ladder(candidate_laws(variation, *(ring or ())), readings, variation, tick)
 
 
-def assess(data: IdentificationData, selection: LawSelection, run_to_run: float | None) -> LawQuality:
-    """Uncertainty of the selected law for readings of a new run."""
+def assess(
+    data: IdentificationData, selection: LawSelection, run_to_run: float | None, kinds: ToldApart | None = None
+) -> LawQuality:
+    """Uncertainty of the selected law for readings of a new run; ``kinds`` tells how well kinds are told apart."""
     used, found, left_out = data.used, selection.fit, selection.validation
     groups = len(used.groups)
     everything = data.prepared.readings
@@ -320,8 +396,8 @@ def assess(data: IdentificationData, selection: LawSelection, run_to_run: float 
         between, of_band = between._replace(std=0.0), 0.0
     else:
         of_band = between.of_band
-    told_apart = collinear_spread(selection.scores, found, used)
-    in_addition = math.hypot(of_band, told_apart)
+    unseen = collinear_spread(selection.scores, found, used) if kinds is None else kinds.unseen_std
+    in_addition = math.hypot(of_band, unseen)
     with progress('test the band', groups * (groups - 1)) as advance:
         coverage = validation.band_coverage(selection.law, selection.readings, found.values, advance)
     names = [parameter.name for parameter in selection.law.parameters]
@@ -330,7 +406,8 @@ def assess(data: IdentificationData, selection: LawSelection, run_to_run: float 
         between_runs=between,
         is_stated=run_to_run is not None,
         changes=diagnostics.shared_levels(everything) + diagnostics.swept_logs_compared(used, found),
-        told_apart=told_apart,
+        told_apart=unseen,
+        kinds=kinds,
         coverage=coverage,
         calibration=calibration(selection.law, selection.readings, found.values, run_to_run),
         repeatability=diagnostics.repeatability(used, found.offsets),
@@ -352,14 +429,13 @@ def _breakaway(data: IdentificationData, found: fitting.LawFit) -> BreakawayFit 
 
 
 def _levels(
-    data: IdentificationData, selection: LawSelection, quality: LawQuality, document: Mapping[str, Any]
+    data: IdentificationData, selection: LawSelection, quality: LawQuality, mounted: tuple[MountedSeal, ...]
 ) -> tuple[PressureLevel, ...]:
-    """Measured and fitted friction at each pressure level, by the law of a seal file with this ``document``."""
+    """Measured and fitted friction at each pressure level, by the ``mounted`` seals."""
     readings = data.prepared.readings
-    seal = parse_seal(document)
-    mounted = tuple(MountedSeal(seal, chamber) for chamber in data.sources.chambers)
     fitted, std = fitted_readings(mounted, data.prepared.chamber_pressures, readings.at.velocity)
     measured = readings.magnitudes(fitting.offsets_of(readings, fitted))
+    is_mean = readings.are_samples or bool(readings.kinds)  # a condition of several kinds holds several speeds
     unseen = np.full((data.used.count, 2), np.nan)
     unseen[:, 0] = selection.validation.predicted
     if selection.chosen_anew is not None:
@@ -371,7 +447,7 @@ def _levels(
         PressureLevel(
             pressure=float(readings.seal_pressure[inside].mean()),
             speed=float(np.abs(readings.at.velocity[inside]).mean()),
-            measured=float(measured[inside].mean()) if readings.are_samples else readings.half_range(inside).friction,
+            measured=float(measured[inside].mean()) if is_mean else readings.half_range(inside).friction,
             fitted=float(fitted[inside].mean()),
             std=float(std[inside].mean()),
             left_out=left_out,
@@ -383,6 +459,12 @@ def _levels(
         )
         for (level, inside), (left_out, nested) in zip(readings.levels.items(), predicted, strict=True)
     )
+
+
+def mounted_seals(documents: Mapping[str, Mapping[str, Any]]) -> tuple[MountedSeal, ...]:
+    """Every seal of the seal files, mounted as they say."""
+    each = [(parse_seal(document), document['mounting']['chambers']) for document in documents.values()]
+    return tuple(MountedSeal(seal, chamber) for seal, chambers in each for chamber in chambers)
 
 
 def fitted_readings(

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw
@@ -14,13 +15,14 @@ from seal_friction_ros.core.friction.seal_file import law_document, parse_seal
 from seal_friction_ros.core.identification import fitting
 from seal_friction_ros.core.identification.breakaway import BreakawayFit
 from seal_friction_ros.core.identification.calibration import Calibration
-from seal_friction_ros.core.identification.candidate_laws import CandidateLaw
+from seal_friction_ros.core.identification.candidate_laws import DIVIDED, CandidateLaw, SealKind, columns_of
 from seal_friction_ros.core.identification.diagnostics import Outlier, RunChange
 from seal_friction_ros.core.identification.force_correction import NOTICED, ForceCorrection
 from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
 from seal_friction_ros.core.identification.run_in import Drift, SettledLaw
 from seal_friction_ros.core.identification.runs import BetweenRuns
-from seal_friction_ros.core.identification.selection import ChosenAnew, LawScore, is_beaten
+from seal_friction_ros.core.identification.seal_kinds import AreaErrors, ToldApart, proposed_conditions
+from seal_friction_ros.core.identification.selection import ChosenAnew, LawScore, NotScored, is_beaten, scored
 from seal_friction_ros.core.identification.signal_preparation import LEVEL_GAP, LEVEL_GAP_MIN
 from seal_friction_ros.core.identification.temperature import TemperatureFit
 from seal_friction_ros.core.identification.validation import CrossValidation, PredictionUncertainty
@@ -31,9 +33,7 @@ from seal_friction_ros.offline.identification.presliding import (
     presliding_part,
 )
 from seal_friction_ros.offline.identification.sources import Sources
-from seal_friction_ros.offline.work.seal_writer import rounded
-
-DIGITS = 6  # of a number in a seal file
+from seal_friction_ros.offline.work.seal_writer import rounded_numbers
 
 
 class Ring(NamedTuple):
@@ -52,8 +52,14 @@ class IdentificationData:
     used: FrictionReadings  # those that the law is fitted to
     ring: Ring | None
     outlier: Outlier | None
-    correction: ForceCorrection | None  # of an area in the force sum, made if it is significant; None if unknown
+    correction: ForceCorrection | AreaErrors | None
+    """of areas in the force sum, made if it is significant; None if unknown"""
     temperature: TemperatureFit | None = None  # all readings are at its reference if it is identified
+
+    @property
+    def kinds(self) -> tuple[SealKind, ...]:
+        """Kinds of seals; one without a name unless there are several."""
+        return self.used.kinds or (SealKind('', self.sources.chambers),)
 
     def is_outlier(self, level: int) -> bool:
         """Whether a pressure level is the outlier, which the law is not fitted to."""
@@ -65,7 +71,7 @@ class LawSelection:
     """All candidate laws with their scores, and the law that is saved."""
 
     readings: FrictionReadings  # that laws are chosen, left out and scored on: as measured, or of the settled seal
-    scores: tuple[LawScore, ...]  # on these readings
+    scores: tuple[LawScore | NotScored, ...]  # on these readings
     best: LawScore  # recommended: the simplest law that no other law beats beyond the noise
     fit: fitting.LawFit  # to the readings as measured
     settled: SettledLaw | None  # that the seal file holds; None: that of the readings as measured
@@ -111,6 +117,7 @@ class LawQuality:
     drifts: list[Drift]  # of the friction over each run
     breakaway: BreakawayFit | None  # None if no stroke starts from rest
     standard_errors: dict[str, float]  # of the parameters, by name
+    kinds: ToldApart | None = None  # how well several kinds of seals are told apart; None for one kind
 
 
 class PressureLevel(NamedTuple):
@@ -137,16 +144,17 @@ class Identification:
     selection: LawSelection
     quality: LawQuality
     levels: tuple[PressureLevel, ...]
-    document: dict[str, Any]  # seal file: the law of the settled seal, if a drift is evident
-    as_measured: dict[str, Any]  # seal file with the law of the readings as measured; the same without a drift
+    documents: dict[str, dict[str, Any]]
+    """kind -> seal file, one without a name unless there are several: of the settled seal, if a drift is evident"""
+    as_measured: dict[str, dict[str, Any]]  # with the law of the readings as measured; the same without a drift
     warnings: tuple[str, ...]  # limits of the law that its user has to know
     remarks: tuple[str, ...]  # assumptions, and how an option changes them
     presliding: IdentifiedPresliding | None = None  # None if it was not asked for
 
-
-def rounded_value(value: float) -> float:
-    """A number as a seal file of an identification has it."""
-    return rounded(value, DIGITS)
+    @property
+    def document(self) -> dict[str, Any]:
+        """Seal file of the first kind, which is the only one unless there are several."""
+        return next(iter(self.documents.values()))
 
 
 def seal_document(
@@ -154,25 +162,29 @@ def seal_document(
     selection: LawSelection,
     quality: LawQuality,
     name: str,
+    number: int = 0,
     settled: SettledLaw | None = None,
     presliding: IdentifiedPresliding | None = None,
 ) -> dict[str, Any]:
-    """Seal file of the selected law, or of that law for the ``settled`` seal, checked as the node checks it.
+    """Seal file of a kind of seals by the selected law, or by that for the ``settled`` seal, checked as by the node.
+
+    The standard deviation is its share of that of all seals together, also at pressures that were not driven.
 
     Raises:
         ValueError: The law makes no valid seal.
     """
-    seals, law = len(data.sources.chambers), selection.law
-    values = _json_value((selection.fit if settled is None else settled.fit).values)
+    seals, law, kind = len(data.sources.chambers), selection.law, data.kinds[number]
+    values = rounded_numbers(law.of_one_seal((selection.fit if settled is None else settled.fit).values)[number])
     of_settled = '' if settled is None else ', of the settled seal'
+    of_kind = f'{kind.name} fitted together with the other kinds of seals of the cylinder: ' if kind.name else ''
     relative = math.hypot(quality.uncertainty.relative, 0.0 if settled is None else settled.relative_std)
     files = ', '.join(file.name for file in data.sources.files)
     document: dict[str, Any] = {
         'name': name,
-        'source': f'Made by seal_friction identify from {files}: law {law.name} ({law.formula}){of_settled}, '
+        'source': f'Made by seal_friction identify from {files}: {of_kind}law {law.name} ({law.formula}){of_settled}, '
         f'parameters by least squares over {data.used.count} readings, uncertainty from readings left out.',
     }
-    document['mounting'] = {'chambers': list(data.sources.chambers)}
+    document['mounting'] = {'chambers': list(kind.chambers)}
     if data.ring is not None:
         document['geometry'] = asdict(data.ring.geometry)
     document |= law_document(law.friction_law(values))
@@ -184,24 +196,24 @@ def seal_document(
     )
     uncertainty = {'relative_std': relative, 'absolute_std': quality.uncertainty.absolute / seals}
     numbers = {'stiction': stiction, 'stiction_ratio': ratio, 'uncertainty': uncertainty}
-    document |= _json_value({**numbers, 'identified_pressure': _identified_pressure(data)})
+    document |= rounded_numbers({**numbers, 'identified_pressure': _identified_pressure(data, number)})
     speed = np.abs(data.used.at.velocity)
     if np.isfinite(speed).all():
-        document['identified_speed'] = _json_value([float(speed.min()), float(speed.max())])
+        document['identified_speed'] = rounded_numbers([float(speed.min()), float(speed.max())])
     document['identified_directions'] = [int(side) for side in np.unique(data.used.at.direction)]
     lacking = _what_the_force_sum_lacks(data, selection.fit)
     if lacking is not None:
         document['force_sum_correction'] = asdict(lacking)
     warmth = data.temperature
     if warmth is not None and not warmth.why_not:
-        document['temperature'] = _json_value(asdict(warmth.scale))
+        document['temperature'] = rounded_numbers(asdict(warmth.scale))
     if presliding is not None:
-        document['presliding'] = _json_value(presliding_part(presliding))
+        document['presliding'] = rounded_numbers(presliding_part(presliding))
     parse_seal(document)
     return document
 
 
-def _identified_pressure(data: IdentificationData) -> list[float]:
+def _identified_pressure(data: IdentificationData, number: int) -> list[float]:
     """Lowest and highest pressure [Pa] at which the law holds: of the longer run of levels on one side of an outlier.
 
     Of two equally long runs the lower one counts (our choice). One held pressure is a range, too, as wide as
@@ -214,6 +226,7 @@ def _identified_pressure(data: IdentificationData) -> list[float]:
             for side in (everything.level < data.outlier.level, everything.level > data.outlier.level)
         )
         used = (above if len(above.levels) > len(below.levels) else below).at.pressure
+    used = used[:, columns_of(data.kinds, number)]
     low, high = float(used.min()), float(used.max())
     if high - low <= (step := max(LEVEL_GAP * high, LEVEL_GAP_MIN)):  # one level
         return [max(low - step / 2.0, 0.0), high + step / 2.0]
@@ -232,31 +245,21 @@ def _what_the_force_sum_lacks(data: IdentificationData, fit: fitting.LawFit) -> 
     offset = -float(np.mean(fit.offsets[sources]))
     friction = float(fit.friction(readings.at).mean())
     made = data.correction if data.correction is not None and data.correction.is_significant else None
-    areas = {} if made is None else {f'area_{made.chamber}': rounded_value(made.area)}
-    matters, contains_load = bool(areas) or abs(offset) >= NOTICED * friction, data.sources.has_fitted_load
+    area_a, area_b = (0.0, 0.0) if made is None else rounded_numbers(made.areas)
+    matters, contains_load = made is not None or abs(offset) >= NOTICED * friction, data.sources.has_fitted_load
     if not matters and not contains_load:
         return None
-    return ForceSumCorrection(**areas, offset=rounded_value(offset) if matters else 0.0, contains_load=contains_load)
+    zero = rounded_numbers(offset) if matters else 0.0
+    return ForceSumCorrection(area_a=area_a, area_b=area_b, offset=zero, contains_load=contains_load)
 
 
 def _without_nan(numbers: Mapping[str, Any]) -> dict[str, Any]:
     """Rounded numbers without those that are not known, at any depth."""
     return {
         key: _without_nan(value) if isinstance(value, Mapping) else value
-        for key, value in _json_value(numbers).items()
+        for key, value in rounded_numbers(numbers).items()
         if value is not None
     }
-
-
-def _json_value(value: Any) -> Any:
-    """Value with each number rounded; None for a number that is not finite."""
-    if isinstance(value, Mapping):
-        return {key: _json_value(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_json_value(item) for item in value]
-    if not isinstance(value, float):
-        return value
-    return rounded_value(value) if math.isfinite(value) else None
 
 
 def identification_section(
@@ -268,8 +271,8 @@ def identification_section(
     presliding: IdentifiedPresliding | None = None,
 ) -> dict[str, Any]:
     """Section ``identification`` of the seal file, which records how it was made; the node ignores it."""
-    measured, fitted = _json_value([[level.measured for level in levels], [level.fitted for level in levels]])
-    section: dict[str, Any] = _json_value(
+    measured, fitted = (rounded_numbers([getattr(level, name) for level in levels]) for name in ('measured', 'fitted'))
+    section: dict[str, Any] = rounded_numbers(
         {
             'law': selection.law.name,
             'recommended_law': selection.best.law.name,
@@ -297,11 +300,75 @@ def identification_section(
     return section if presliding is None else section | {'presliding': _without_nan(presliding_numbers(presliding))}
 
 
+def kind_section(data: IdentificationData, quality: LawQuality, number: int) -> dict[str, Any]:
+    """What the section ``identification`` of the seal file of one of several kinds has in addition."""
+    kind, told = data.kinds[number], quality.kinds
+    if told is None:
+        return {}
+    return {
+        'kind': kind.name,
+        'friction_N': rounded_numbers(float(told.friction[number])),
+        'std_of_this_kind_alone_N': rounded_numbers(float(told.apart_std[number])),
+        'fitted_together_with': [other.name for other in data.kinds if other is not kind],
+    }
+
+
+def kinds_numbers(found: Identification) -> dict[str, Any]:
+    """Numbers for JSON that several kinds of seals have in addition; empty for one kind."""
+    readings, fit, told = found.data.used, found.selection.fit, found.quality.kinds
+    if told is None or fit.model is None:
+        return {}
+    conditions, correlation = proposed_conditions(readings, fit.model)
+    shared = {'friction_at_no_pressure_N' if name == DIVIDED[0] else name: value for name, value in fit.values.items()}
+    names = ('friction_at_no_pressure_N', 'viscous_friction', 'stribeck_friction', 'stribeck_velocity', 'asymmetry')
+    lacking = found.document.get('force_sum_correction', {})
+    return {
+        'kinds': [_kind_numbers(found, fit, told, number) for number in range(len(readings.kinds))],
+        **{name: shared.get(name, 0.0) for name in names},
+        'correlation': told.correlation,
+        'pressure_a_Pa': _level_means(readings, readings.chamber_pressures[:, 0]),
+        'pressure_b_Pa': _level_means(readings, readings.chamber_pressures[:, 1]),
+        'area_correction_m2': [lacking.get(f'area_{chamber}', 0.0) for chamber in 'ab'],
+        'offset_N': fit.offsets,
+        'next': [{'pressure_a_Pa': c.a, 'pressure_b_Pa': c.b} for c in conditions],
+        'next_correlation': correlation,
+    }
+
+
+def _level_means(readings: FrictionReadings, values: FloatArray) -> list[float]:
+    """Mean of one value per reading at each pressure level."""
+    return [float(values[inside].mean()) for inside in readings.levels.values()]
+
+
+def _kind_numbers(found: Identification, fit: fitting.LawFit, told: ToldApart, number: int) -> dict[str, Any]:
+    """Numbers of the kind of index ``number``."""
+    readings, total = found.data.used, float(told.friction.sum())
+    kind = readings.kinds[number]
+    of_one = fit.law.of_one_seal(fit.values)[number]
+    return {
+        'name': kind.name,
+        'seal_chambers': list(kind.chambers),
+        'law': f'{kind.name}: f_0 + k P^{of_one["pressure_exponent"]:.3g}',
+        'pressure_exponent': of_one['pressure_exponent'],
+        'friction_at_one_bar': of_one['friction_at_one_bar'],
+        'friction_N': float(told.friction[number]),
+        'rising_N': float(told.rising[number]),
+        'rising_standard_error_N': float(told.errors[number]),
+        'division_std_N': float(told.division_std[number]),
+        'share': float(told.friction[number]) / total,
+        'share_std': float(told.apart_std[number]) / total,
+        'pressure_correlation': float(told.together[number]),
+        'pressure_Pa': _level_means(readings, readings.at.pressure[:, columns_of(readings.kinds, number)].mean(axis=1)),
+        'fitted_N': _level_means(readings, fit.law.frictions(readings.at, fit.values)[:, number]),
+    }
+
+
 def identification_numbers(found: Identification) -> dict[str, Any]:
     """Numbers for JSON."""
     data, selection, quality, levels = found.data, found.selection, found.quality, found.levels
-    reference, correction = selection.reference, data.correction
-    numbers: dict[str, Any] = found.document['identification'] | _json_value(
+    reference = selection.reference
+    correction = data.correction if isinstance(data.correction, ForceCorrection) else None
+    numbers: dict[str, Any] = found.document['identification'] | rounded_numbers(
         {
             'std_N': [level.std for level in levels],
             'left_out_N': [level.left_out for level in levels],
@@ -351,6 +418,7 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
         'samples_total': data.prepared.total,
         'samples_left_out': data.prepared.left_out,
         'remarks': list(found.remarks),
+        **rounded_numbers(kinds_numbers(found)),
     }
 
 
@@ -395,9 +463,9 @@ def _breakaway_numbers(found: Identification) -> dict[str, Any]:
     return {
         **law._asdict(),
         'standard_errors': list(law.standard_errors),
-        'pressure_Pa': _json_value(readings.level_pressures.tolist()),
-        'measured_N': _json_value([float(measured[inside].mean()) for inside in levels]),
-        'fitted_N': _json_value([float(fitted[inside].mean()) for inside in levels]),
+        'pressure_Pa': rounded_numbers(readings.level_pressures),
+        'measured_N': rounded_numbers([float(measured[inside].mean()) for inside in levels]),
+        'fitted_N': rounded_numbers([float(fitted[inside].mean()) for inside in levels]),
     }
 
 
@@ -406,11 +474,11 @@ def worst_left_out(levels: Sequence[PressureLevel]) -> float:
     return max(abs(level.left_out / level.measured - 1.0) for level in levels if level.is_used)
 
 
-def _ladder_row(score: LawScore, selection: LawSelection) -> dict[str, Any]:
+def _ladder_row(score: LawScore | NotScored, selection: LawSelection) -> dict[str, Any]:
     row: dict[str, Any] = {'law': score.law.name, 'parameters': len(score.law.parameters)}
-    if score.validation is None or score.fit is None:
+    if isinstance(score, NotScored):
         return row | {'why_not': score.why_not}
-    best = min((s.validation.losses for s in selection.scores if s.validation), key=np.mean)
+    best = min((each.validation.losses for each in scored(selection.scores)), key=np.mean)
     return row | {
         'values': score.fit.values,
         'rms_N': score.validation.rms,

@@ -14,13 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
-from seal_friction_ros.core.foundation.stamps import repaired_stamps
 from seal_friction_ros.core.foundation.units import UNITS, ZEROS
 from seal_friction_ros.core.identification.admission import (
     BEYOND_LOAD,
     NOT_FINITE,
     SAME_STAMP,
-    Order,
     bridged,
     check_admitted,
     in_order,
@@ -35,6 +33,7 @@ from seal_friction_ros.core.identification.load_over_position import (
 )
 from seal_friction_ros.core.identification.prepare_readings import prepare_logs, prepare_manual_readings
 from seal_friction_ros.core.identification.readings import ManualReadings, PreparedReadings, RecordedLog, check_clipping
+from seal_friction_ros.core.identification.seal_kinds import AreaErrors
 from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding
 from seal_friction_ros.files import config_path, share_directory
 from seal_friction_ros.offline.bags.actuator_bag import open_actuator
@@ -126,8 +125,8 @@ class Sources:
         """Area by which the rig file turns the pressure into force [m^2]; None if the sources have no rig file."""
         return next((source.pressure_area for source in self.each if source.pressure_area is not None), None)
 
-    def corrected(self, correction: ForceCorrection) -> 'Sources':
-        """The sources with an area of the force sum corrected in every log."""
+    def corrected(self, correction: ForceCorrection | AreaErrors) -> 'Sources':
+        """The sources with areas of the force sum corrected in every log."""
         each = tuple(
             s if s.log is None else s._replace(log=s.log._replace(signals=correction.corrected(s.log.signals)))
             for s in self.each
@@ -319,14 +318,12 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
     if missing:
         raise ValueError(f'{path}: no {" and no ".join(missing)} messages: they are needed to identify friction')
     stamp, received, columns, configuration = read_velocity_rows(bag)
-    stamp, repair = repaired_stamps(stamp, received)
     chambers, document, holds_load, has_placeholder = None, None, False, False
     if configuration is not None:
         holds_load = configuration.parameters().estimator.force_sum_correction.contains_load
         has_placeholder, chambers = configuration.has_placeholder, configuration.selection.seal_chambers
         document = None if has_placeholder else configuration.seal_documents[0]
-    repaired = [f'{bag.name}: {text}' for text in repair.said('the stamp of the velocity')]
-    order = in_order(stamp)
+    order = in_order(stamp, received)
     columns[~(np.abs(columns) < 1e15)] = np.nan  # [SI] no measurement is as large
     columns = columns[:, order.rows]
     temperature = _from_the_first(columns[5] + ZEROS['degC']) if topics.temperature else None
@@ -343,7 +340,7 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
         seal_document=document,
         has_placeholder=has_placeholder,
         load_position=places,
-        remarks=(*repaired, *log.remarks, *_order_texts(bag.name, order)),
+        remarks=(*(f'{bag.name}: {text}' for text in order.texts), *log.remarks),
     )
 
 
@@ -365,17 +362,6 @@ def _admitted(log: RecordedLog, options: SourceOptions) -> _Admitted:
     check_admitted(log.name, len(signals.time) + sum(log.dropped.values()), {**log.dropped, NOT_FINITE: missing})
     texts = (f'{log.name}: {count} samples had no value, and are on a straight line between their neighbours',)
     return _Admitted(log._replace(signals=signals, sliding=_sliding(log.sliding, options)), texts * (count > 0))
-
-
-def _order_texts(name: str, order: Order) -> Iterator[str]:
-    """What was done about stamps that were out of order."""
-    if order.is_sorted:
-        yield f'{name}: the messages came out of order, and were sorted by their stamps'
-    if order.segments > 1:
-        yield (
-            f'{name}: stamps step back {order.segments - 1} times (a looped playback, a clock that was set, or a stamp '
-            f'of the future): {order.segments} segments are used, one after the other'
-        )
 
 
 def _from_the_first(temperature: FloatArray) -> FloatArray:

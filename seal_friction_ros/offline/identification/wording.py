@@ -13,7 +13,10 @@ from seal_friction_ros.core.identification.force_correction import ForceCorrecti
 from seal_friction_ros.core.identification.readings import has_pressures
 from seal_friction_ros.core.identification.run_in import SettledLaw
 from seal_friction_ros.core.identification.runs import BetweenRuns
+from seal_friction_ros.core.identification.seal_kinds import poorly_told_apart, proposed_conditions
+from seal_friction_ros.core.identification.selection import LawScore, scored
 from seal_friction_ros.core.identification.temperature import TemperatureFit
+from seal_friction_ros.core.identification.validation import CrossValidation
 from seal_friction_ros.core.identification.what_a_log_tells import FreeRod
 from seal_friction_ros.offline.identification.presliding import presliding_text
 from seal_friction_ros.offline.identification.results import (
@@ -48,8 +51,13 @@ def warnings_of(
             f'measured at {low:.4g} to {high:.4g} bar only: there the law holds; how friction rises beyond comes from '
             'a prior, not from these data: measure at three pressures to know it'
         )
-    if data.correction is not None and data.correction.is_significant:
+    if isinstance(data.correction, ForceCorrection) and data.correction.is_significant:
         yield _correction_text(data.correction, data.sources.pressure_area)
+    elif data.correction is not None and data.correction.is_significant:
+        change = ' and '.join(
+            f'{1e6 * x:+.3g} mm2 for chamber {c}' for c, x in zip('ab', data.correction.areas, strict=True)
+        )
+        yield f'the areas in the force sum are off: {change}; the laws are fitted with the corrected areas'
     if data.outlier is not None:
         yield _outlier_text(data.outlier, levels)
     yield from _collinearity_texts(data, selection)
@@ -146,11 +154,36 @@ def _collinearity_texts(data: IdentificationData, selection: LawSelection) -> It
         yield f'the parameters are not determined: {selection.fit.why_unsound}'
 
 
+def kinds_warnings(data: IdentificationData, selection: LawSelection, quality: LawQuality) -> Iterator[str]:
+    """What the cylinder does not tell of several kinds of seals, one line each; nothing for one kind."""
+    told, values = quality.kinds, selection.fit.values
+    if told is None:
+        return
+    kinds, total = data.kinds, float(told.friction.sum())
+    constant, viscous = values['friction_at_no_pressure'], values.get('viscous_friction', 0.0)
+    if constant > 0.0 or viscous > 0.0:
+        yield (
+            f'the friction at no pressure, {constant:.3g} N of all seals ({100.0 * constant / total:.0f} % of the '
+            f'friction),{" and the viscous friction" * (viscous > 0.0)} cannot be divided between '
+            f'{" and ".join(kind.name for kind in kinds)} by any pressure of this cylinder: it is divided as the rest '
+            'is: use the seal files together'
+        )
+    for name, friction, error in poorly_told_apart(told, kinds):
+        yield (
+            f'{name}: {friction:.3g} N with a standard error of {error:.2g} N, which --largest-kind-error lets pass: '
+            'the sum of all kinds is better known than each: use the seal files in this cylinder only'
+        )
+    if float(told.together.max()) > diagnostics.COLLINEAR:
+        yield (
+            f'the pressures of the kinds moved nearly together (correlation {float(told.together.max()):.2f}), so the '
+            'kinds are told apart by little'
+        )
+
+
 def _pressure_gain(selection: LawSelection) -> tuple[str, bool] | None:
     """Best law with against best law without pressure-dependent Coulomb friction: text, and whether pressure pays."""
-    scored = [(score.law, score.validation) for score in selection.scores if score.validation is not None]
-    scored.sort(key=lambda pair: float(pair[1].losses.mean()), reverse=True)
-    best = {law.depends_on_pressure: (law.name, validation) for law, validation in scored}
+    ordered = sorted(scored(selection.scores), key=lambda score: float(score.validation.losses.mean()), reverse=True)
+    best = {score.law.depends_on_pressure: (score.law.name, score.validation) for score in ordered}
     if len(best) < 2:
         return None
     (name, validation), (other_name, other) = best[True], best[False]
@@ -236,15 +269,16 @@ def remarks_on(data: IdentificationData, selection: LawSelection) -> Iterator[st
     gain = _pressure_gain(selection)
     if gain is not None and gain[1]:
         yield f'pressure pays: {gain[0]}'
-    if data.ring is None:
+    if data.ring is None and not data.used.kinds:
         yield 'the geometry of the ring is unknown, so the physics-based law was not tried: name a seal with --seal'
     if selection.law.name != selection.best.law.name:
         yield f'{selection.law.name} is saved as asked for with --law; recommended is {selection.best.law.name}'
     chambers = data.sources.chambers
-    yield (
-        f'the law is that of one seal of {len(chambers)}, on chambers {",".join(chambers)}, as the file says: for the '
-        'node name it once, seals: [FILE]'
-    )
+    if not data.used.kinds:
+        yield (
+            f'the law is that of one seal of {len(chambers)}, on chambers {",".join(chambers)}, as the file says: for '
+            'the node name it once, seals: [FILE]'
+        )
     if prepared.breakaway is None and prepared.readings.are_samples:
         yield 'breakaway is not identified from logs without held pressures'
 
@@ -260,10 +294,28 @@ def _temperature_text(found: TemperatureFit) -> str:
     )
 
 
+def _kinds_lines(found: Identification) -> Iterator[str]:
+    """Share of each kind of seals, and the pressures that tell them apart; nothing for one kind."""
+    told, readings = found.quality.kinds, found.data.used
+    if told is None:
+        return
+    total = float(told.friction.sum())
+    yield '  kind              seals on         friction [N]   share [%]   std of the share [%]'
+    rows = zip(found.data.kinds, told.friction.tolist(), told.apart_std.tolist(), strict=True)
+    for kind, friction, std in rows:
+        numbers = f'{friction:12.4g}  {100.0 * friction / total:10.3g}  {100.0 * std / total:21.2g}'
+        yield f'  {kind.name:16}  {",".join(kind.chambers):16} {numbers}'
+    conditions, correlation = proposed_conditions(readings, found.selection.fit.model)
+    if conditions:
+        pairs = ', '.join(f'{c.a / BAR:.3g} and {c.b / BAR:.3g}' for c in conditions)
+        change = f'correlation of the pressures {float(told.together.max()):.2f} -> {correlation:.2f}'
+        yield f'next: chambers a and b at {pairs} bar, both directions: {change}'
+
+
 def summary(found: Identification) -> str:
     """The result for a person: law, numbers at each pressure, ladder, remarks and warnings."""
     selection, quality = found.selection, found.quality
-    lines = [f'law: {selection.law.name} ({selection.law.formula})']
+    lines = [*_kinds_lines(found), f'law: {selection.law.name} ({selection.law.formula})']
     (first, fit), *others = selection.fits_by_name.items()
     for p in selection.law.parameters:
         also = ''.join(f' ({first}; {other.values[p.name]:.4g} {name})' for name, other in others)
@@ -275,13 +327,16 @@ def summary(found: Identification) -> str:
         lines.append(f'  {numbers}{"" if level.is_used else "  outlier, not used"}')
     of_settled = 'of the settled seal, ' if selection.is_chosen_on_settled_seal else ''
     lines += [f'laws on left-out readings ({of_settled}left out by {found.data.used.left_out_by}):']
-    rows = [(score.law.name, score.validation, score.why_not) for score in selection.scores]
-    for name, validation, why_not in [*rows, ('mean of the other readings', selection.reference, '')]:
-        if validation is not None:
+    rows: list[tuple[str, CrossValidation | str | None]] = [
+        (score.law.name, score.validation if isinstance(score, LawScore) else score.why_not)
+        for score in selection.scores
+    ]
+    for name, result in [*rows, ('mean of the other readings', selection.reference)]:
+        if isinstance(result, CrossValidation):
             mark = ' <- recommended' if name == selection.best.law.name else ''
-            lines.append(f'  {name:32} {validation.rms:9.4g} N RMS  {100.0 * validation.error:5.1f} %{mark}')
-        elif why_not:
-            lines.append(f'  {name:32} not fitted: {why_not}')
+            lines.append(f'  {name:32} {result.rms:9.4g} N RMS  {100.0 * result.error:5.1f} %{mark}')
+        elif result:
+            lines.append(f'  {name:32} not fitted: {result}')
     if found.presliding is not None:
         lines += [presliding_text(found.presliding)]
     lines += [f'95 % band: holds {100.0 * quality.coverage:.0f} % of the left-out readings']

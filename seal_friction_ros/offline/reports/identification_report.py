@@ -1,7 +1,9 @@
 """Report of an identification: measured friction, fitted law, and the out-of-sample error of each law."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from textwrap import wrap
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,13 +20,14 @@ from seal_friction_ros.core.friction.laws.prior_art_chart import PriorArtChart
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.identification import diagnostics
 from seal_friction_ros.core.identification.calibration import Calibration
-from seal_friction_ros.core.identification.candidate_laws import normal_forces
+from seal_friction_ros.core.identification.candidate_laws import columns_of, normal_forces
 from seal_friction_ros.core.identification.fitting import offsets_of
 from seal_friction_ros.core.identification.readings import FrictionReadings
+from seal_friction_ros.core.identification.selection import NotScored, scored
 from seal_friction_ros.core.identification.validation import CrossValidation
 from seal_friction_ros.files import config_path, read_yaml
-from seal_friction_ros.offline.identification.pipeline import fitted_readings
-from seal_friction_ros.offline.identification.results import Identification, Ring, worst_left_out
+from seal_friction_ros.offline.identification.pipeline import fitted_readings, mounted_seals
+from seal_friction_ros.offline.identification.results import Identification, Ring, kinds_numbers, worst_left_out
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
@@ -42,14 +45,23 @@ _DIRECTIONS = ((1.0, style.BLUE, 'extending'), (-1.0, style.ORANGE, 'retracting'
 
 
 @house_style()
-def write_identification_report(found: Identification, out: Path) -> tuple[Path, ...]:
-    """Write the report of an identification; result and errors as of `write_page`."""
-    plots = identification_figures(found)
+def write_identification_report(
+    found: Identification, out: Path, files: Mapping[str, Path] | None = None
+) -> tuple[Path, ...]:
+    """Write the report of an identification; result and errors as of `write_page`.
+
+    Args:
+        found: The identification.
+        out: HTML file.
+        files: Kind -> its seal file, of several kinds of seals.
+    """
+    plots, kinds = identification_figures(found), kinds_numbers(found)
+    names = {kind: path.name for kind, path in (files or {}).items() if kind}
     return write_page(
         out,
         'identification',
         plots,
-        verdict=_verdict(found),
+        verdict=_verdict(found, list(names.values())),
         head=head_of(
             'identify', ', '.join(file.name for file in found.data.sources.files[:3]), 'the data have no date'
         ),
@@ -65,12 +77,20 @@ def write_identification_report(found: Identification, out: Path) -> tuple[Path,
         parameter_table=_parameter_table(found),
         correlation_table=_correlation_table(found),
         data_table=_data_table(found),
-        document=seal_text(found.document),
+        kinds=kinds,
+        kinds_table=_kinds_table(kinds.get('kinds', ())),
+        kinds_files=names,
+        documents=[seal_text(document) for document in found.documents.values()],
     )
 
 
-def _verdict(found: Identification) -> Verdict:
-    quality, selection = found.quality, found.selection
+def _verdict(found: Identification, files: Sequence[str]) -> Verdict:
+    quality, selection, told = found.quality, found.selection, found.quality.kinds
+    if told is not None:
+        total = float(told.friction.sum())
+        parts = zip(found.data.kinds, told.friction.tolist(), told.apart_std.tolist(), strict=True)
+        shares = [(kind.name, friction / total, std / total) for kind, friction, std in parts]
+        return verdicts.of_kinds(selection.validation.error, shares, files)
     numbers = verdicts.IdentificationNumbers(
         law=selection.law.name,
         error=selection.validation.error,
@@ -105,6 +125,20 @@ def _level_table(found: Identification) -> Table:
     return table_of(found.levels, columns)
 
 
+def _kinds_table(kinds: Sequence[Mapping[str, Any]]) -> Table:
+    columns: Columns = (
+        ('kind', lambda kind: kind['name']),
+        ('seals on', lambda kind: ', '.join(kind['seal_chambers'])),
+        ('law', lambda kind: kind['law'].partition(': ')[2]),
+        ('friction [N]', lambda kind: number(kind['friction_N'])),
+        ('of it rising with pressure [N]', lambda kind: number(kind['rising_N'])),
+        ('standard error of that [N]', lambda kind: number(kind['rising_standard_error_N'])),
+        ('share [%]', lambda kind: number(100.0 * kind['share'], 1)),
+        ('std of the share [%]', lambda kind: number(100.0 * kind['share_std'], 1)),
+    )
+    return table_of(kinds, columns, (0, 1, 2))
+
+
 def _ladder_table(found: Identification) -> Table:
     def errors(validation: CrossValidation) -> list[str]:
         return [number(validation.rms), number(validation.mean_deviation), number(100.0 * validation.error, 1)]
@@ -112,7 +146,7 @@ def _ladder_table(found: Identification) -> Table:
     selection, rows = found.selection, []
     for score in selection.scores:
         cells = [f'{score.law.name} ({score.law.formula})', len(score.law.parameters)]
-        if score.validation is None or score.fit is None:
+        if isinstance(score, NotScored):
             rows.append((*cells, *4 * [DASH], score.why_not))
             continue
         marks = {'recommended': score is selection.best, 'saved': score.law is selection.law}
@@ -154,9 +188,11 @@ def _parameter_table(found: Identification) -> Table:
 
 
 def _correlation_table(found: Identification) -> Table:
-    names = [p.name for p in found.selection.law.parameters]
-    correlation = zip(names, found.selection.fit.correlation.tolist(), strict=True)
-    rows = [(name, *(number(value, 3, signed=True) for value in values)) for name, values in correlation]
+    names, correlation = [p.name for p in found.selection.law.parameters], found.selection.fit.correlation
+    if found.quality.kinds is not None:
+        names, correlation = [kind.name for kind in found.data.kinds], found.quality.kinds.correlation
+    pairs = zip(names, correlation.tolist(), strict=True)
+    rows = [(name, *(number(value, 3, signed=True) for value in values)) for name, values in pairs]
     return Table(('correlation', *names), rows, (0,))
 
 
@@ -178,8 +214,8 @@ class _FittedReadings:
         self.found = found
         self.readings = found.data.prepared.readings
         self.pressure = self.readings.seal_pressure / BAR
-        self.seal = parse_seal(found.as_measured)
-        self.mounted = tuple(MountedSeal(self.seal, chamber) for chamber in found.data.sources.chambers)
+        self.mounted = mounted_seals(found.as_measured)
+        self.seal = self.mounted[0].seal
         self.fitted, _ = fitted_readings(self.mounted, found.data.prepared.chamber_pressures, self.readings.at.velocity)
         self.measured = self.readings.magnitudes(offsets_of(self.readings, self.fitted))
         self.unit, self.size = force_unit(float(self.measured.max()))
@@ -208,8 +244,10 @@ def identification_figures(found: Identification) -> list[Plot]:
     """Every figure that the data allow."""
     shown = _FittedReadings(found)
     ring, breakaway = found.data.ring, found.data.prepared.breakaway
-    plots = [fitted_law_figure(shown), agreement_figure(shown), calibration_figure(found)]
-    plots += [out_of_sample_figure(found), ladder_figure(found)]
+    plots = [agreement_figure(shown), calibration_figure(found), out_of_sample_figure(found)]
+    if found.data.used.kinds:
+        return [kinds_figure(found), left_out_figure(found), *plots]
+    plots = [fitted_law_figure(shown), *plots, ladder_figure(found)]
     if shown.readings.are_samples:
         plots.append(velocity_cloud_figure(shown))
     if breakaway is not None:
@@ -218,6 +256,40 @@ def identification_figures(found: Identification) -> list[Plot]:
         plots += [fitted_coefficient_figure(shown, ring), computed_normal_force_figure(shown, ring)]
         plots += prior_art_readings_figure(shown, ring)
     return plots
+
+
+def left_out_figure(found: Identification) -> Plot:
+    """Measured friction over the prediction without it, at each level."""
+    levels = [(level.measured, level.left_out, level.std) for level in found.levels]
+    measured, left_out, std = np.array(levels).T
+    figure, ax = style.new_figure('Friction of all seals at pressures left out', 4.2)
+    ends = np.array([0.0, 1.05 * max(measured.max(), left_out.max())])
+    order = np.argsort(left_out)
+    style.fill_band(ax, left_out[order], left_out[order], BAND_95 * std[order], label='95 % band')
+    ax.plot(ends, ends, color=style.GREY, lw=1.0, label='equal')
+    ax.plot(left_out, measured, 'o', color=style.BLUE, label='pressure level')
+    labels = {'xlabel': 'predicted without it [N]', 'ylabel': 'measured [N]', 'xlim': ends}
+    return finished('measured_over_left_out', figure, ax, **labels)
+
+
+def kinds_figure(found: Identification) -> Plot:
+    """Friction of each kind over the pressure that its seals see, as its seal file has it, with the 95 % band."""
+    kinds, used = found.data.kinds, found.data.used
+    figure, axes = style.panels('Friction of each kind by its seal file', len(kinds), 3.2)
+    for index, (ax, kind) in enumerate(zip(axes, kinds, strict=True)):
+        seal = parse_seal(found.documents[kind.name])
+        pressure = np.linspace(seal.pressure_min, seal.pressure_max, 60)
+        mounted = tuple(MountedSeal(seal, 'a') for _ in kind.chambers)
+        friction, std = fitted_readings(mounted, np.column_stack((pressure, 0.0 * pressure)), 0.0 * pressure)
+        style.fill_band(ax, pressure / BAR, friction, BAND_95 * std, label='95 % band')
+        ax.plot(pressure / BAR, friction, color=style.BLUE, label='seal file')
+        of_kind = used.at.pressure[:, columns_of(kinds, index)].mean(axis=1) / BAR
+        seen = np.array([of_kind[inside].mean() for inside in used.levels.values()])
+        ax.plot(seen, np.zeros_like(seen), 'o', color=style.ORANGE, ms=5.0, label='pressures driven')
+        ax.set_title(f'{kind.name}: {", ".join(kind.chambers)}', pad=18.0)
+    style.label_panels(axes, 'pressure at the seals [bar]', 'friction [N]')
+    axes[0].set_ylim(bottom=-0.04 * axes[0].get_ylim()[1])
+    return finished('friction_of_kinds', figure, axes[0])
 
 
 def _draw_readings(ax: Axes, shown: _FittedReadings, x: FloatArray, y: FloatArray) -> None:
@@ -338,15 +410,15 @@ def out_of_sample_figure(found: Identification) -> Plot:
 
 def ladder_figure(found: Identification) -> Plot:
     """Out-of-sample error of each law."""
-    scored = [(score, 100.0 * score.validation.error) for score in found.selection.scores if score.validation]
-    errors = [error for _, error in scored]
-    labels = ['\n'.join(wrap(score.law.formula, _FORMULA_WIDTH)) for score, _ in scored]
+    each = [(score, 100.0 * score.validation.error) for score in scored(found.selection.scores)]
+    errors = [error for _, error in each]
+    labels = ['\n'.join(wrap(score.law.formula, _FORMULA_WIDTH)) for score, _ in each]
     heights = np.array([label.count('\n') + 1.6 for label in labels])  # in lines, with a gap
     place = (np.cumsum(heights) - 0.5 * heights).tolist()
     title = 'Error of each law on readings left out of its fit'
     figure, ax = style.new_figure(title, 1.3 + _LINE * float(heights.sum()))
     figure.set_layout_engine('constrained', rect=(0.012, 0.0, 0.98, 1.0))  # the widest label is not cut off
-    colours = [style.GREEN if score is found.selection.best else style.SKY for score, _ in scored]
+    colours = [style.GREEN if score is found.selection.best else style.SKY for score, _ in each]
     bars = ax.barh(place, errors, color=colours, height=1.0)
     ax.bar_label(bars, labels=[f'{error:.1f} %' for error in errors], padding=4)
     ax.set_yticks(place, labels)

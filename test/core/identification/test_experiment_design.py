@@ -18,8 +18,8 @@ from seal_friction_ros.core.identification.experiment_design import (
 from seal_friction_ros.core.identification.fitting import LawFit, fit
 from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.runs import BetweenRuns, between_runs
-from seal_friction_ros.core.identification.selection import LawScore, score_laws, with_velocity_terms
-from seal_friction_ros.core.identification.validation import cross_validate, jackknife_errors
+from seal_friction_ros.core.identification.selection import LawScore, NotScored, score_laws, with_velocity_terms
+from seal_friction_ros.core.identification.validation import CrossValidation, cross_validate, jackknife_errors
 
 BASE = next(law for law in candidate_laws(Variation()) if law.name == 'pressure_power_law_2_3')
 VISCOUS, *_, ASYMMETRIC = with_velocity_terms(BASE, Variation())
@@ -361,6 +361,13 @@ CONSTANT = next(law for law in candidate_laws(Variation()) if law.name == 'const
 LEVEL = 'coulomb_friction_at_any_pressure'
 
 
+def left_out_alike(found, losses=(1.0, 1.0, 1.0, 1.0)):
+    """Score of a law whose parameters are the same without any group."""
+    vector = [found.values[p.name] for p in found.law.parameters]
+    alike = CrossValidation(np.zeros(0), np.zeros(0), np.asarray(losses, float), np.tile(vector, (4, 1)))
+    return LawScore(found.law, found, alike, alike.losses)
+
+
 def constant(off, n=8):
     """Readings of 20 N of two seals that are alternately off by this share, with their fit."""
     direction = np.repeat([1.0, -1.0], n // 2)
@@ -369,7 +376,7 @@ def constant(off, n=8):
     zeros = np.zeros(n, int)
     readings = FrictionReadings(at, force, zeros, np.arange(n) % 4, zeros, ('log',), 'block', False)
     found = LawFit(CONSTANT, {LEVEL: 10.0}, np.array([3.0]), np.full((n, 1), 0.1))
-    return readings, LawScore(CONSTANT, found, losses=np.ones(4))
+    return readings, left_out_alike(found)
 
 
 def test_scatter_is_the_standard_deviation_about_the_law_less_what_is_fitted_and_a_hundredth_at_least():
@@ -383,7 +390,7 @@ def test_a_law_gets_the_viscous_friction_and_the_friction_at_no_pressure_that_we
     readings = measured(np.array([30.0, 30.0]) * BAR, np.full(2, 0.02), np.random.default_rng(0), scatter=0.0)
     (prior,) = candidate_laws(Variation(pressures=1))
     values = {'friction_at_one_bar': 1.5, 'pressure_exponent': 2.0 / 3.0, 'friction_at_no_pressure': 0.0}
-    score = LawScore(prior, LawFit(prior, values, np.zeros(1), np.ones((4, 1))), losses=np.ones(4))
+    score = left_out_alike(LawFit(prior, values, np.zeros(1), np.ones((4, 1))))
     found = design_experiment([score], readings, NO_RUNS, 0.0, 1).law
     assert [p.name for p in found.parameters] == ['friction_at_no_pressure', 'friction_at_one_bar', 'viscous_friction']
 
@@ -391,8 +398,7 @@ def test_a_law_gets_the_viscous_friction_and_the_friction_at_no_pressure_that_we
 def test_laws_disagree_by_their_largest_difference_over_their_mean():
     readings, _ = constant(0.06)
     scores = [
-        LawScore(CONSTANT, LawFit(CONSTANT, {LEVEL: level}, np.zeros(1), np.ones((8, 1))), losses=np.ones(4))
-        for level in (10.0, 11.0, 15.0)
+        left_out_alike(LawFit(CONSTANT, {LEVEL: level}, np.zeros(1), np.ones((8, 1)))) for level in (10.0, 11.0, 15.0)
     ]
     found = design_experiment(scores, readings, NO_RUNS, 0.0, 2)
     assert [reading.disagreement for reading in found.readings] == pytest.approx([5.0 / 12.0] * 2)
@@ -403,7 +409,7 @@ def test_laws_disagree_by_their_largest_difference_over_their_mean():
 def scored(law, losses, condition=1.0, **values):
     jacobian = np.eye(max(len(law.parameters), 3))[:, : len(law.parameters)] * condition
     inside = {p.name: 0.5 * (p.lower + p.upper) for p in law.parameters} | values
-    return LawScore(law, LawFit(law, inside, np.zeros(1), jacobian), losses=np.asarray(losses, float))
+    return left_out_alike(LawFit(law, inside, np.zeros(1), jacobian), losses)
 
 
 def designed_for(scores):
@@ -413,7 +419,7 @@ def designed_for(scores):
 def test_the_richest_law_that_is_not_beaten_and_not_at_its_bound_is_designed_for():
     even = np.ones(4)
     scores = [scored(CONSTANT, 1.3 * even), scored(BASE, 1.05 * even), scored(VISCOUS, even)]
-    near = laws_not_beaten([LawScore(CONSTANT, why_not='too few'), *scores])
+    near = laws_not_beaten([NotScored(CONSTANT, 'too few'), *scores])
     assert near == scores[1:]
     assert designed_for(near) is VISCOUS
     at_bound = scored(VISCOUS, even, friction_at_one_bar=VISCOUS.parameters[1].upper)
@@ -425,8 +431,8 @@ def test_the_richest_law_that_is_not_beaten_and_not_at_its_bound_is_designed_for
     assert laws_not_beaten([without_effect]) == [without_effect]
     wild = scored(BASE, [9.0, 0.1, 0.1, 0.1])  # twice as far off in the mean, though no test tells it
     assert laws_not_beaten([wild, scores[2]]) == [scores[2]]
-    with pytest.raises(ValueError, match='no law was fitted'):
-        laws_not_beaten([LawScore(CONSTANT, why_not='too few')])
+    with pytest.raises(ValueError, match='no law could be fitted'):
+        laws_not_beaten([NotScored(CONSTANT, 'too few')])
 
 
 def test_a_design_says_what_it_is_for(designed):

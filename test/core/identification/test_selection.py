@@ -16,6 +16,7 @@ from seal_friction_ros.core.identification.fitting import LawFit
 from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.selection import (
     LawScore,
+    NotScored,
     Rise,
     choose_anew,
     choose_without,
@@ -198,7 +199,7 @@ RISES, DOES_NOT = Rise(5.0, 1.0), Rise(1.0, 1.0)
             ONE,
         ),
         ([score('pressure_power_law_2', 1.04 * EVEN), score(ONE, 1.02 * EVEN), score(FREE, EVEN)], None, ONE),
-        ([LawScore(LAWS[CONSTANT], why_not='too few'), score(FREE, EVEN)], None, FREE),
+        ([NotScored(LAWS[CONSTANT], 'too few'), score(FREE, EVEN)], None, FREE),
         ([score(ONE, [9.0, 0.1, 0.1, 0.1]), score(FREE, EVEN)], None, FREE),  # twice as far off
         ([score(ONE, [9.0, 0.1, 0.1, 0.1]), score(FREE, EVEN)], DOES_NOT, ONE),  # the rise decides, not four numbers
     ],
@@ -209,7 +210,7 @@ def test_the_simplest_law_that_is_not_beaten_is_recommended(scores, rise, name):
 
 def test_without_any_fit_there_is_no_recommendation_but_the_reasons():
     with pytest.raises(ValueError, match='no law could be fitted: constant_coulomb: too few; pressure_power_law: bad'):
-        recommended([LawScore(LAWS[CONSTANT], why_not='too few'), LawScore(LAWS[FREE], why_not='bad')])
+        recommended([NotScored(LAWS[CONSTANT], 'too few'), NotScored(LAWS[FREE], 'bad')])
 
 
 def test_a_group_for_which_no_law_can_be_chosen_has_no_prediction():
@@ -355,11 +356,10 @@ def test_the_best_sound_law_that_depends_on_pressure_is_tried_again_with_speeds(
     two = made.taken(made.level < 2)
     (too_few,) = score_laws([chosen[1]], two)
     assert too_few.why_not == '2 parameters need 3 pressures, there are 2'
-    assert (too_few.fit, too_few.losses) == (None, None)
+    assert isinstance(too_few, NotScored)
     by_test = replace(made.taken(made.level < 2), group=np.arange(16) % 2, left_out_by='test')
-    assert score_laws([chosen[1]], by_test)[0].why_not == ''  # each test has both pressures
+    assert isinstance(score_laws([chosen[1]], by_test)[0], LawScore)  # each test has both pressures
     (broken,) = score_laws([chosen[0]], replace(made, force=np.full(made.count, np.nan)))
-    assert broken.fit is None
     assert broken.why_not
 
 
@@ -415,7 +415,7 @@ def test_laws_that_fit_nearly_as_well_spread_where_speed_and_pressure_part():
     assert collinear_spread([best, near(100.0, 0.0, 1.9)], chosen, made) == pytest.approx(mean)
     assert collinear_spread([best, near(100.0, 0.0, 2.1)], chosen, made) == 0.0
     assert collinear_spread([near(0.0, 0.0, 0.1), near(100.0, 0.0, 0.21)], chosen, made) == 0.0
-    assert collinear_spread([best, LawScore(LAWS[CONSTANT], why_not='too few')], chosen, made) == 0.0
+    assert collinear_spread([best, NotScored(LAWS[CONSTANT], 'too few')], chosen, made) == 0.0
     unsound = near(100.0, 0.0)
     unsound.fit.why_unsound = 'asymmetry is at its bound of -0.9'
     assert collinear_spread([best, unsound], chosen, made) == 0.0

@@ -176,12 +176,39 @@ def test_equal_kinds_of_names_and_options_of_one_kind_are_refused(tmp_path):
     for more, word in (
         (('--seal-kind', 'rod=a'), 'two kinds'),
         ((*KINDS, '--seal-chambers', 'a,b'), '--seal-chambers'),
-        ((*KINDS, '--law', 'constant_coulomb'), '--law'),
+        ((*KINDS, '--law', 'constant_coulomb'), "--law 'constant_coulomb' is not one of all_terms"),
+        ((*KINDS, '--seal', 'ms28775_114'), '--seal is for one kind'),
         (('--largest-kind-error', '0.2'), '--seal-kind'),
     ):
         run = Run(tmp_path, *log, *more)
         assert run.code == 2
         assert word in run.errors
+
+
+def test_options_of_one_kind_are_taken_for_several_and_change_nothing_where_they_ask_for_what_is(tmp_path):
+    log, work = write_log(tmp_path, held(GRID[::2], rng())), tmp_path / 'work'
+    plain = Run(tmp_path, *log, *KINDS, name='plain')
+    more = ('--law', 'all_terms', '--refuse-changed', '--workers', '2', '--work', str(work))
+    asked = Run(tmp_path, *log, *KINDS, *more, name='asked')
+    assert asked.code == 0, asked.errors
+    assert asked.figures['kinds'] == plain.figures['kinds']
+    assert asked.figures['calibration'] == plain.figures['calibration']
+
+
+def test_a_source_with_other_friction_is_refused_for_several_kinds_too(tmp_path):
+    def both(a, b):
+        return rod_friction(a) + piston_friction(a - b)
+
+    for name, share in (('one', 1.0), ('two', 1.4)):
+        (tmp_path / name).mkdir()
+        write_log(tmp_path / name, held(GRID[::2], rng()), kinds=lambda a, b, s=share: s * both(a, b))
+    logs, rig = (
+        [str(next((tmp_path / name).glob('*.csv'))) for name in ('one', 'two')],
+        next(tmp_path.glob('one/*.yaml')),
+    )
+    run = Run(tmp_path, *logs, '--rig', str(rig), *KINDS, '--refuse-changed')
+    assert run.code == 2
+    assert 'two seals or two states of one' in run.errors
 
 
 def test_the_page_has_the_share_of_each_kind_and_every_pressure_left_out(tmp_path):
@@ -190,7 +217,8 @@ def test_the_page_has_the_share_of_each_kind_and_every_pressure_left_out(tmp_pat
     assert run.code == 0, run.errors
     assert run.figures['report'] == str(out)
     page = checked_page(out)
-    assert set(page.figures) == {'friction_of_kinds', 'measured_over_left_out'}
+    of_kinds = {'friction_of_kinds', 'measured_over_left_out'}
+    assert set(page.figures) == of_kinds | {'calibration', 'measured_against_model', 'residuals'}
     for kind in run.figures['kinds']:
         assert f'{100.0 * kind["share"]:.1f}' in page.prose
     assert 'use the seal files together: seals: [seal_rod.yaml, seal_piston.yaml]' in page.prose

@@ -136,3 +136,11 @@ def test_nothing_is_left_of_a_report_that_cannot_be_written(tmp_path, capsys):
     assert main(arguments) == 2
     assert not (tmp_path / 's.yaml').exists()
     assert 'cannot write' in capsys.readouterr().err
+
+
+def test_the_law_of_all_terms_has_a_page_with_the_correlations_of_its_parameters(tmp_path):
+    few, out = str(few_of_the_thesis(tmp_path)), tmp_path / 'page.html'
+    assert main(['identify', few, '--law', 'all_terms', '--out', str(tmp_path / 's.yaml'), '--report', str(out)]) == 0
+    rows = checked_page(out).table('correlation')
+    assert [row['correlation'] for row in rows][:2] == ['friction_at_no_pressure', 'friction_at_one_bar']
+    assert all(float(row[row['correlation']]) == 1.0 for row in rows)
