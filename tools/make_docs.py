@@ -16,6 +16,7 @@ from seal_friction_ros.core.friction.actuator import Uncertainty
 from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws import FRICTION_LAWS
+from seal_friction_ros.core.friction.laws.contact_shear import ShearLaw
 from seal_friction_ros.core.friction.laws.friction_coefficient import CoefficientTable, PowerLaw
 from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain, NormalForceTable
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
@@ -72,6 +73,7 @@ RECORDS = (
     Rubber,
     OringNumerics,
     OringCase,
+    ShearLaw,
     MeasuredFriction,
     StudySeal,
     Topography,

@@ -11,9 +11,9 @@ def add_parser(commands: Any) -> None:
     """Add the command."""
     parser = cli.add_command(
         commands, 'spool', run, 'evaluate a reciprocating rig after the spool-valve paper',
-        'spool ten_cycles.csv --out outer_ring.html',
+        'spool ten_cycles.csv --out outer_ring.html', 'spool ten_cycles_bag --out outer_ring.html',
     )  # fmt: skip
-    parser.add_argument('table', type=Path, help='table with the columns time_s, displacement_mm, force_N')
+    parser.add_argument('table', type=Path, help='table with time_s, displacement_mm, force_N, or a bag')
     cli.add_page(parser)
     parser.add_argument('--cycles', type=int, default=10, help='cycles of a measurement, default 10')
     parser.add_argument('--cycle', type=int, default=9, help='cycle to evaluate, default 9')

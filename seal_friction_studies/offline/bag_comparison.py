@@ -82,7 +82,7 @@ def compare_with_bag(
         ValueError: The bag cannot be read or has no position and force in the window, or a step did not converge.
     """
     law = SpoolEvaluation() if evaluation is None else evaluation
-    time, position, force = _recorded(bag, window)
+    time, position, force = recorded_motion(bag, window)
     position = position - 0.5 * (position.max() + position.min()) + case.motion.centre
     result = _run_through(case, bag, time, position)
     measured = force - _offset(position, force)
@@ -108,13 +108,24 @@ def compare_with_bag(
     )
 
 
-class _Recorded(NamedTuple):
+class RecordedMotion(NamedTuple):
+    """Position and force of a bag, without samples that lack one of them."""
+
     time: FloatArray  # [s] from the first sample
     position: FloatArray  # [m]
     force: FloatArray  # [N]
 
 
-def _recorded(bag: Path, window: tuple[float, float] | None) -> _Recorded:
+def recorded_motion(bag: Path, window: tuple[float, float] | None = None) -> RecordedMotion:
+    """Position and force sum of a bag; without position, the velocity is integrated.
+
+    Args:
+        bag: Bag with estimates.
+        window: Begin and end of the part to take [s]; None takes all.
+
+    Raises:
+        ValueError: The bag cannot be read, or has too few samples with both in the window.
+    """
     recorded = read_run(bag)
     begin, end = window or (0.0, float('inf'))
     position = recorded.position
@@ -127,7 +138,7 @@ def _recorded(bag: Path, window: tuple[float, float] | None) -> _Recorded:
             f'{bag}: {good.sum()} samples with position and force in {begin} to {end} s: choose another window'
         )
     time = recorded.time[good]
-    return _Recorded(time - time[0], position[good], recorded.force_sum[good])
+    return RecordedMotion(time - time[0], position[good], recorded.force_sum[good])
 
 
 def _run_through(case: StudyCase, bag: Path, time: FloatArray, position: FloatArray) -> TransientResult:

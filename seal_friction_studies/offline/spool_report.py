@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.units import MM
 from seal_friction_ros.offline.identification.sources import column_in_si, table_rows
 from seal_friction_ros.offline.reports import figure_style as style
@@ -12,7 +13,9 @@ from seal_friction_ros.offline.reports.figure_style import Plot, finished, house
 from seal_friction_ros.offline.reports.page import ReportSummary, head_of, write_page
 from seal_friction_studies.core.spool_evaluation import SpoolEvaluation, SpoolFriction, evaluate_cycles
 from seal_friction_studies.offline import verdicts
+from seal_friction_studies.offline.bag_comparison import recorded_motion
 
+FEWEST_ROWS = 100  # of a table (our choice)
 COLUMN_UNITS = {
     'time': {'s': 's', 'ms': 'ms'},
     'displacement': {'m': 'm', 'mm': 'mm', 'um': 'um'},
@@ -28,7 +31,7 @@ def write_spool_report(
 
     Args:
         table: Comma-separated columns ``time_s`` (or ``_ms``), ``displacement_mm`` (``_m``, ``_um``) and ``force_N``
-            (``_kN``, ``_lbf``), with a constant sample time.
+            (``_kN``, ``_lbf``), with a constant sample time; or a bag with position and force sum.
         out: HTML file.
         settings: Parameters of the evaluation.
         reference: Reference force [N] of another measurement; None for that of this measurement.
@@ -36,10 +39,9 @@ def write_spool_report(
     Raises:
         ValueError: The table cannot be read or evaluated, or the page cannot be written.
     """
-    rows = table_rows(table)
-    if len(rows) < 100:
-        raise ValueError(f'{table}: {len(rows)} rows are too few for {settings.cycles} cycles')
-    time, displacement, force = (column_in_si(table, rows, *column) for column in COLUMN_UNITS.items())
+    time, displacement, force = recorded_motion(table) if _is_bag(table) else _columns(table)
+    if len(time) < FEWEST_ROWS:
+        raise ValueError(f'{table}: {len(time)} rows are too few for {settings.cycles} cycles')
     steps = np.diff(time)
     if not (np.isfinite(steps).all() and steps.min() > 0.5 * np.median(steps) and steps.max() < 1.5 * np.median(steps)):
         raise ValueError(
@@ -70,6 +72,16 @@ def write_spool_report(
     }
     figures = write_page(out, Path(__file__).with_name('templates') / 'spool_evaluation', plots, **shown)
     return ReportSummary(out, figures, numbers)
+
+
+def _is_bag(path: Path) -> bool:
+    return path.is_dir() or path.suffix in ('.mcap', '.db3')
+
+
+def _columns(table: Path) -> tuple[FloatArray, ...]:
+    """Time, displacement and force of a table."""
+    rows = table_rows(table)
+    return tuple(column_in_si(table, rows, *column) if rows else np.zeros(0) for column in COLUMN_UNITS.items())
 
 
 def displacement_figure(found: SpoolFriction, settings: SpoolEvaluation) -> Plot:

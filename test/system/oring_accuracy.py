@@ -10,7 +10,8 @@ Tables, all of them by default:
 - ``thesis``: calibrated and blind case against Appendix B [%], also cell by cell, axial force over pressure times area,
   volume lost;
 - ``variants``: the blind case with another section, modulus, ring or friction;
-- ``friction``: friction of one seal from geometry alone against the measured one, thesis's seals and Delft O-ring.
+- ``friction``: friction of one seal from geometry alone against the measured one, thesis's seals and Delft O-ring;
+- ``transfer``: friction of one ring from another one, or from one reading, beside a constant and mu N [%].
 """
 
 import dataclasses
@@ -24,6 +25,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from harness.campaign import parser_of, tell_tables
 from harness.hertz import cylinder_between_plates
+from harness.ring_transfer import transfer_rows
 from harness.squeezed_cylinder import force_per_length
 
 from seal_friction_ros.core.foundation.units import BAR, INCH, LBF, PSI
@@ -240,6 +242,7 @@ TABLES: dict[str, Callable[[Sequence[int]], Rows]] = {
     'thesis': lambda _: thesis(),
     'variants': lambda _: variants(),
     'friction': lambda _: friction(),
+    'transfer': lambda _: list(transfer_rows()),
 }
 """Name -> its rows, given the meshes of the table ``lines``."""
 

@@ -8,9 +8,9 @@ Example; docs/oring.md describes every field::
     groove: {width: 3.6e-3, diametral_clearance: 0.1e-3}
     rubber: {hardness: 70.0}            # or elastic_modulus [Pa]; mooney_ratio, bulk_modulus
     pressures: [0.0, 3.4e+6, 6.9e+6]    # [Pa, gauge]
-    friction:                           # optional: needed for a seal file and for computed friction
-      friction_coefficient: {law: power_law, coefficient: 2.1, exponent: 0.56}
-      stiction: 2.5
+    friction:                           # optional: without it --reading or a prior
+      contact_shear: {shear_stress: 0.25e6, exponent: 0.333}   # or friction_coefficient, as in a seal file
+      stiction_ratio: 0.13
       uncertainty: {relative_std: 0.2}
     measured: {seals: 2, pressures: [...], frictions: [...], source: ...}   # optional: for comparison
     unknown: {rubber.hardness: {tolerance: 5.0}}    # optional: for the uncertainty of what is computed
@@ -32,25 +32,17 @@ from seal_friction_ros.core.foundation.parameters import (
 from seal_friction_ros.core.foundation.unknowns import Unknown, parse_unknowns
 from seal_friction_ros.core.friction.actuator import Uncertainty
 from seal_friction_ros.core.friction.geometry import SealGeometry
+from seal_friction_ros.core.friction.laws.contact_shear import ShearLaw
 from seal_friction_ros.core.friction.laws.friction_coefficient import FrictionCoefficientLaw
 from seal_friction_ros.core.friction.seal_file import parse_part
 from seal_friction_ros.core.oring_contact.material import Rubber, elastic_modulus_of_hardness
 from seal_friction_ros.core.oring_contact.oring_case import Groove, OringCase, OringNumerics, check_pressures
+from seal_friction_ros.core.oring_contact.ring_friction import RingLaw, SealFriction
 
 _KEYS = (
     'name', 'source', 'geometry', 'groove', 'rubber', 'wall_friction', 'numerics', 'pressures', 'friction', 'measured',
     'unknown',
 )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class SealFriction:
-    """Friction data of a seal file besides geometry and normal force."""
-
-    friction_coefficient: Mapping[str, Any]  # mapping as in a seal file
-    law: FrictionCoefficientLaw
-    stiction: float  # [N]
-    uncertainty: Uncertainty
 
 
 @dataclass(frozen=True)
@@ -150,6 +142,9 @@ class _Stiction(CheckedParameters):
     stiction: float = parameter(
         0.0, unit='N', lower=0.0, upper=1e6, description='Breakaway friction above Coulomb friction.'
     )
+    stiction_ratio: float = parameter(
+        0.0, unit='1', lower=0.0, upper=10.0, description='The same, as a share of the Coulomb friction.'
+    )
 
 
 def _friction(document: Mapping[str, Any], where: str) -> SealFriction | None:
@@ -157,13 +152,19 @@ def _friction(document: Mapping[str, Any], where: str) -> SealFriction | None:
     if values is None:
         return None
     where = f'{where}: friction'
-    allowed = ('friction_coefficient', 'stiction', 'uncertainty')
+    allowed = ('contact_shear', 'friction_coefficient', 'stiction', 'stiction_ratio', 'uncertainty')
     if not isinstance(values, Mapping) or not set(values) <= set(allowed):
         raise ValueError(f'{where} = {values!r} is not a mapping of {", ".join(allowed)}')
-    law = parse_part(FrictionCoefficientLaw, values, where)
-    stiction = from_mapping(_Stiction, {k: v for k, v in values.items() if k == 'stiction'}, where).stiction
+    if ('contact_shear' in values) == ('friction_coefficient' in values):
+        raise ValueError(f'{where}: give one of contact_shear and friction_coefficient; got {", ".join(values)}')
+    law: RingLaw
+    if 'contact_shear' in values:
+        law = from_mapping(ShearLaw, values['contact_shear'], f'{where}: contact_shear')
+    else:
+        law = parse_part(FrictionCoefficientLaw, values, where)
+    stiction = from_mapping(_Stiction, {k: v for k, v in values.items() if k.startswith('stiction')}, where)
     uncertainty = from_mapping(Uncertainty, values.get('uncertainty'), f'{where}: uncertainty')
-    return SealFriction(values['friction_coefficient'], law, stiction, uncertainty)
+    return SealFriction(law, uncertainty, stiction.stiction, stiction.stiction_ratio)
 
 
 def _measured(document: Mapping[str, Any], where: str) -> MeasuredFriction | None:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
+from seal_friction_ros.core.friction.laws.contact_shear import REFERENCE_STRESS
 from seal_friction_ros.core.oring_contact.elements import deformation_gradient, volume_ratios
 from seal_friction_ros.core.oring_contact.equilibrium import OringModel, outline
 from seal_friction_ros.core.oring_contact.loading import LoadedRing, loaded_states, oring_model
@@ -35,11 +36,26 @@ class WallContact(NamedTuple):
     which a sharp transition between fluid and contact gives [N]"""
     peak_stress: float  # [Pa]
     edges: tuple[float, float]  # begin and end of the contact [m]; equal without contact
+    circumference: float = 0.0  # of the wall at the contact [m]
 
     @property
     def width(self) -> float:
         """Contact width [m]."""
         return self.edges[1] - self.edges[0]
+
+    def sheared_area(self, exponent: float) -> float:
+        r"""Area of the contact weighted by its stress [m^2]: :math:`A_n = \int (\sigma / 1\,\mathrm{MPa})^n\,dA`.
+
+        A shear stress tau = c (sigma / 1 MPa)^n has the friction c A_n. The square of the stress is linear between the
+        nodes and the edges, as at the edge of Hertz (our choice). All stress is scaled so that A_1 is the normal force
+        over 1 MPa: the step at the edge of the fluid is not in the profile.
+        """
+        if not len(self.position):
+            return 0.0
+        place = np.concatenate(([self.edges[0]], self.position, [self.edges[1]]))
+        stress = np.concatenate(([0.0], self.stress, [0.0])) / REFERENCE_STRESS
+        scale = self.force / REFERENCE_STRESS / (self.circumference * _power_integral(place, stress, 1.0))
+        return self.circumference * _power_integral(place, scale * stress, exponent)
 
 
 class DeformedSection(NamedTuple):
@@ -136,7 +152,19 @@ def _contact(loaded: LoadedRing, position: FloatArray, wall: int) -> WallContact
     contact_position, contact_stress = along[inside][order], stress[inside][order]
     above = (stresses[:, wall] - fluid)[inside][order]
     edges = _edge(contact_position, above), _edge(contact_position[::-1], above[::-1])
-    return WallContact(contact_position, contact_stress, force, wall_force, float(contact_stress.max()), edges)
+    circumference = 2.0 * np.pi * float(position[inside, 0].mean())
+    return WallContact(
+        contact_position, contact_stress, force, wall_force, float(contact_stress.max()), edges, circumference
+    )
+
+
+def _power_integral(place: FloatArray, value: FloatArray, exponent: float) -> float:
+    """Integral of ``value ** exponent`` over ``place``, the square of the value linear between the points."""
+    low, high = np.sort(np.stack((value[:-1], value[1:])) ** 2, axis=0)
+    power, rise = 0.5 * exponent + 1.0, high - low
+    flat = rise <= 1e-9 * high  # where the quotient of differences would round
+    mean = (high**power - low**power) / (power * np.where(flat, 1.0, rise))
+    return float(np.where(flat, high ** (0.5 * exponent), mean) @ np.diff(place))
 
 
 def _edge(position: FloatArray, above: FloatArray) -> float:

@@ -294,6 +294,35 @@ def positive(text: str) -> float:
     return float(text)
 
 
+def quantities(*units: str) -> Callable[[str], tuple[float, ...]]:
+    """Type of an option: numbers in SI or with a unit, separated by commas, one for each of these ``units`` of SI."""
+
+    def values(text: str) -> tuple[float, ...]:
+        """Numbers in SI that a text is."""
+        parts = text.split(',')
+        if len(parts) != len(units):
+            raise argparse.ArgumentTypeError(f'{text} is not {len(units)} values, separated by commas')
+        try:
+            return tuple(_in_si(part.strip(), unit) for part, unit in zip(parts, units, strict=True))
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(f'{text}: {error}') from None
+
+    return values
+
+
+def _in_si(text: str, unit: str) -> float:
+    """Number in SI of a text with or without a unit, finite and at least 0."""
+    from seal_friction_ros.core.foundation.units import in_si
+
+    try:
+        value = float(text)
+    except ValueError:
+        value = in_si(text, unit, 'value')
+    if not 0.0 <= value < math.inf:
+        raise ValueError(f'{text} is not a finite number of at least 0')
+    return value
+
+
 def at_least(least: int) -> Callable[[str], int]:
     """Type of an option: a whole number of at least ``least``."""
 

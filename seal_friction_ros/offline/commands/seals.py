@@ -1,6 +1,7 @@
-"""Commands on seal files and data sheets: ``seal_friction`` ``sheet``, ``seals``, ``charts``."""
+"""Commands on seal files and data sheets: ``seal_friction`` ``sheet``, ``seals``, ``charts``, ``force``."""
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,11 @@ def add_parser(commands: Any) -> None:
     seals = cli.add_command(commands, 'seals', run_seals, text, 'seals', 'seals my_seals --full')
     text, example = 'write a page with the curves of a seal file', 'charts ms28775_114 --out ms28775_114.html'
     charts = cli.add_command(commands, 'charts', run_charts, text, example)
+    text = 'friction and breakaway of a seal file, or of an O-ring from its geometry'
+    examples = 'force ms28775_114 --pressure 35bar 69bar --seals 2', 'force ./my_ring.yaml --pressure 3.5e6 --speed 10mm/s'
+    force = cli.add_command(commands, 'force', run_force, text, *examples)
+    cli.add_file(force, 'seal', 'seals', 'seal file, or case of an O-ring', metavar='SEAL')
+    cli.add_options(force, _OF_FORCE)
     text = 'sheet to write; a page goes beside it'
     cli.add_target(sheet, '--out', DATA_SHEET, required=True, metavar='SHEET.csv', help=text)
     cli.add_file(sheet, '--seal', 'seals', 'seal file whose geometry is filled in')
@@ -46,6 +52,28 @@ _OF_SHEET: dict[str, tuple[str, cli.Settings]] = {
     '--length-unit': ('default mm', {'choices': ('mm', 'in'), 'default': 'mm'}),
 }
 _OF_PLAN = ('tests', 'seals', 'pressure_unit', 'force_unit', 'length_unit')
+
+
+def _one(unit: str) -> Callable[[str], float]:
+    values = cli.quantities(unit)
+    return lambda text: values(text)[0]
+
+
+_OF_FORCE: dict[str, tuple[str, cli.Settings]] = {
+    '--pressure': ('gauge, in Pa or with a unit', {'type': _one('Pa'), 'nargs': '+', 'required': True, 'metavar': 'P'}),
+    '--speed': ('in m/s or with a unit; default: Coulomb friction', {'type': _one('m/s'), 'default': 0.0}),
+    '--seals': ('seals at that pressure, default 1', {'type': cli.at_least(1), 'default': 1, 'metavar': 'N'}),
+}
+
+
+def run_force(arguments: argparse.Namespace) -> int:
+    """Print friction, band and breakaway at each pressure."""
+    from seal_friction_ros.files import config_path
+    from seal_friction_ros.offline.contact.seal_force import seal_forces
+
+    path = config_path('seals', arguments.seal)
+    found = seal_forces(path, arguments.pressure, arguments.speed, arguments.seals)
+    return cli.print_result(arguments, found, found.text())
 
 
 def run_sheet(arguments: argparse.Namespace) -> int:

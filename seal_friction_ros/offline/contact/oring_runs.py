@@ -7,12 +7,27 @@ from pathlib import Path
 from statistics import linear_regression
 from typing import Any, NamedTuple
 
+from seal_friction_ros.core.friction.actuator import Uncertainty
 from seal_friction_ros.core.friction.geometry import stretch_force
+from seal_friction_ros.core.friction.laws.contact_shear import ShearLaw
+from seal_friction_ros.core.friction.laws.law import FrictionLaw
+from seal_friction_ros.core.friction.seal_file import law_document, parse_seal
 from seal_friction_ros.core.oring_contact.oring_case import OringCase, check_pressures
-from seal_friction_ros.core.oring_contact.oring_case_file import OringCaseFile, SealFriction, parse_oring_case
+from seal_friction_ros.core.oring_contact.oring_case_file import OringCaseFile, parse_oring_case
 from seal_friction_ros.core.oring_contact.results import OringResult, WallContact, oring_results
+from seal_friction_ros.core.oring_contact.ring_friction import (
+    PRIOR,
+    PRIOR_LAW,
+    FittedShear,
+    Reading,
+    fit_shear_law,
+    friction_after,
+    friction_law,
+    friction_of_contact,
+)
 from seal_friction_ros.files import read_yaml
-from seal_friction_ros.offline.contact.uncertainty import Uncertainty, check_unknown
+from seal_friction_ros.offline.contact.uncertainty import Uncertainty as Spread
+from seal_friction_ros.offline.contact.uncertainty import check_unknown
 from seal_friction_ros.offline.work.progress import progress
 from seal_friction_ros.offline.work.seal_writer import rounded
 
@@ -48,7 +63,11 @@ class OringSummary:
     radial_force_N: float | None
     """value of that line at zero axial force; None with one pressure"""
     friction_N: tuple[float, ...] | None
-    """sliding friction of one seal, if the case has a friction coefficient"""
+    """sliding friction of one seal, if the case has a law for it"""
+    shear_stress_Pa: float | None  # of the contact at 1 MPa of contact stress; None without a shear law
+    shear_exponent: float | None
+    friction_relative_std: float | None
+    reading_deviations: tuple[float, ...]  # friction of the law over each reading, less one
     rod_profile: tuple[Profile, ...]
     gland_profile: tuple[Profile, ...]
     wall_profile: tuple[Profile, ...]  # downstream wall; empty without pressure
@@ -57,9 +76,19 @@ class OringSummary:
 class Computed(NamedTuple):
     """A case and its results."""
 
-    file: OringCaseFile
+    file: OringCaseFile  # its friction is the one in use: of the case, of another seal, or of readings
     results: tuple[OringResult, ...]
     summary: OringSummary
+    readings: tuple[Reading, ...] = ()
+
+    @property
+    def friction_law(self) -> FrictionLaw | None:
+        """Friction over pressure; None without friction, or with one pressure."""
+        if self.file.friction is None or len(self.results) < 2:
+            return None
+        contacts = [sliding_contact(self.file.case, result) for result in self.results]
+        law, pressures = self.file.friction.law, self.summary.pressure_Pa
+        return friction_law(law, self.file.case.geometry, pressures, contacts)
 
 
 def sliding_contact(case: OringCase, result: OringResult) -> WallContact:
@@ -68,14 +97,23 @@ def sliding_contact(case: OringCase, result: OringResult) -> WallContact:
 
 
 def compute_case(
-    path: Path, pressures: Sequence[float] = (), *, for_seal_file: bool = False, for_samples: bool = False
+    path: Path,
+    pressures: Sequence[float] = (),
+    *,
+    readings: Sequence[Reading] = (),
+    law_from: Path | None = None,
+    for_seal_file: bool = False,
+    for_samples: bool = False,
 ) -> Computed:
     """Compute a case file, with a progress bar.
 
     Args:
         path: The case file.
         pressures: Increasing pressures instead of those in the file [Pa, gauge].
-        for_seal_file: Refuse a case without what `seal_document` needs, before computing.
+        readings: Friction of one seal, to which the shear law is fitted.
+        law_from: Seal file of another ring whose shear law takes the place of the friction of the case.
+        for_seal_file: Refuse a case without what `seal_document` needs, before computing; one without friction has
+            `PRIOR`.
         for_samples: Refuse a case in which nothing is unknown, before computing.
 
     Raises:
@@ -87,8 +125,12 @@ def compute_case(
         file = parse_oring_case(document)
         wanted = tuple(pressures) or file.pressures
         check_pressures(file.case, wanted)
-        if for_seal_file:
-            _friction_of_seal(file, wanted)
+        if (for_seal_file or readings) and len(wanted) < 2:
+            raise ValueError(f'case {file.case.name}: a law over pressure needs two pressures at least')
+        if law_from is not None:
+            file = dataclasses.replace(file, friction=friction_after(parse_seal(read_yaml(law_from))))
+        elif file.friction is None and (for_seal_file or readings):
+            file = dataclasses.replace(file, friction=PRIOR)
         if for_samples:
             check_unknown(file.case.name, file.unknown)
         results = []
@@ -96,17 +138,32 @@ def compute_case(
             for result in oring_results(file.case, wanted):
                 results.append(result)
                 advance(1)
+        fitted = _fitted(file, results, readings) if readings else None
     except ValueError as error:
         raise ValueError(f'{path}: {error}') from None
-    return Computed(file, tuple(results), _summary(file, results))
+    if fitted is not None:
+        known = file.friction or PRIOR
+        friction = dataclasses.replace(known, law=fitted.law, uncertainty=Uncertainty(fitted.relative_std))
+        file = dataclasses.replace(file, friction=friction)
+    deviations = () if fitted is None else tuple(fitted.deviations.tolist())
+    return Computed(file, tuple(results), _summary(file, results, deviations), tuple(readings))
 
 
-def _summary(file: OringCaseFile, results: Sequence[OringResult]) -> OringSummary:
+def _fitted(file: OringCaseFile, results: Sequence[OringResult], readings: Sequence[Reading]) -> FittedShear:
+    """The shear law of the readings; its prior is that of the case, or that of the thesis."""
+    known = file.friction.law if file.friction else None
+    prior = known if isinstance(known, ShearLaw) else PRIOR_LAW
+    contacts = [sliding_contact(file.case, result) for result in results]
+    return fit_shear_law(prior, [result.pressure for result in results], contacts, readings)
+
+
+def _summary(file: OringCaseFile, results: Sequence[OringResult], deviations: tuple[float, ...]) -> OringSummary:
     geometry, contacts = file.case.geometry, [sliding_contact(file.case, result) for result in results]
     normal = tuple(contact.force for contact in contacts)
     axial = tuple(result.axial_force for result in results)
     gain, radial = linear_regression(axial, normal) if len(results) > 1 else (None, None)
-    law = file.friction.law if file.friction else None
+    friction = file.friction
+    shear = friction.law if friction and isinstance(friction.law, ShearLaw) else None
     return OringSummary(
         case=file.case.name,
         sliding_wall=geometry.sliding_wall,
@@ -119,7 +176,11 @@ def _summary(file: OringCaseFile, results: Sequence[OringResult]) -> OringSummar
         contact_width_m=tuple(contact.width for contact in contacts),
         area_deformation_gain=gain,
         radial_force_N=radial,
-        friction_N=tuple(law.coefficient_of_friction(force) * force for force in normal) if law else None,
+        friction_N=tuple(friction_of_contact(friction.law, contact) for contact in contacts) if friction else None,
+        shear_stress_Pa=shear.shear_stress if shear else None,
+        shear_exponent=shear.exponent if shear else None,
+        friction_relative_std=friction.uncertainty.relative_std if friction else None,
+        reading_deviations=deviations,
         rod_profile=tuple(_profile(result.rod) for result in results),
         gland_profile=tuple(_profile(result.gland) for result in results),
         wall_profile=tuple(_profile(result.wall) for result in results),
@@ -130,51 +191,52 @@ def _profile(contact: WallContact) -> Profile:
     return Profile(tuple(contact.position.tolist()), tuple(contact.stress.tolist()))
 
 
-def _friction_of_seal(file: OringCaseFile, pressures: Sequence[float]) -> SealFriction:
-    if file.friction is None:
-        raise ValueError(f'case {file.case.name}: a seal file needs the section friction with a friction_coefficient')
-    if len(pressures) < 2:
-        raise ValueError(f'case {file.case.name}: a seal file needs two pressures at least')
-    return file.friction
-
-
-def seal_document(computed: Computed, uncertainty: Uncertainty | None = None) -> dict[str, Any]:
-    """Seal file whose normal force is a table of the computed pressures.
+def seal_document(computed: Computed, spread: Spread | None = None) -> dict[str, Any]:
+    """Seal file whose law is a table over the computed pressures.
 
     Args:
-        computed: The case and its results.
-        uncertainty: Of the friction, from samples; None: that of the case file.
+        computed: The case and its results, computed ``for_seal_file``.
+        spread: Of the friction, from samples; None: the uncertainty of its law.
 
     Raises:
-        ValueError: The case has no friction coefficient or one pressure only.
+        ValueError: It was not, or the friction falls with pressure.
     """
-    file, summary = computed.file, computed.summary
-    friction = _friction_of_seal(file, summary.pressure_Pa)
-    pressures = [rounded(value, DIGITS) for value in summary.pressure_Pa]
-    sampled = {} if uncertainty is None else {'relative_std': rounded(uncertainty.relative_std, 3)}
-    source = f'{file.source} Normal force: finite elements, {file.case.numerics.lines} lines.'
+    file, law, friction = computed.file, computed.friction_law, computed.file.friction
+    if law is None or friction is None:
+        raise ValueError(f'case {file.case.name}: a seal file needs a friction law and two pressures at least')
+    found = friction.uncertainty.relative_std if spread is None else spread.relative_std
+    pressures = [rounded(value, DIGITS) for value in computed.summary.pressure_Pa]
+    readings = f' Shear law: {len(computed.readings)} readings of this ring.' if computed.readings else ''
+    source = f'{file.source} Contact: finite elements, {file.case.numerics.lines} lines.{readings}'
+    speeds = [reading.speed for reading in computed.readings]
     return {
         'name': file.case.name,
         'source': ' '.join(source.split()),
         'geometry': asdict(file.case.geometry),
-        'coulomb_law': 'physics_based',
-        'normal_force': {
-            'law': 'monotone_table',
-            'pressures': pressures,
-            'normal_forces': [rounded(value, DIGITS) for value in summary.normal_force_N],
-        },
-        'friction_coefficient': dict(friction.friction_coefficient),
+        **_rounded(law_document(law)),
         'stiction': friction.stiction,
-        'uncertainty': asdict(friction.uncertainty) | sampled,
+        **({'stiction_ratio': rounded(friction.stiction_ratio, 3)} if friction.stiction_ratio else {}),
+        'uncertainty': asdict(friction.uncertainty) | {'relative_std': rounded(found, 3)},
         'identified_pressure': [pressures[0], pressures[-1]],
+        **({'identified_speed': [min(speeds), max(speeds)]} if speeds else {}),
     }
+
+
+def _rounded(value: Any) -> Any:
+    """A document with numbers of `DIGITS` digits."""
+    if isinstance(value, dict):
+        return {key: _rounded(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_rounded(item) for item in value]
+    return rounded(value, DIGITS) if isinstance(value, float) else value
 
 
 def seal_comment(computed: Computed) -> str:
     """Comment at the beginning of that seal file."""
     summary = computed.summary
     return (
-        'Made by `seal_friction oring`, which computes the normal force from geometry and rubber, see docs/oring.md.\n'
+        'Made by `seal_friction oring`, which computes the contact from geometry and rubber, see docs/oring.md.\n'
+        f'Normal force [N]: {", ".join(f"{force:.5g}" for force in summary.normal_force_N)}.\n'
         f'As a line over axial force: area_deformation_gain: {summary.area_deformation_gain:.6g} [1], '
         f'radial_force: {summary.radial_force_N:.6g} [N].'
     )

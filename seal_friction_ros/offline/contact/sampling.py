@@ -8,6 +8,7 @@ Source: M. D. McKay, R. J. Beckman, W. J. Conover: A comparison of three methods
 in the analysis of output from a computer code, Technometrics 21, 1979.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import partial
@@ -24,6 +25,7 @@ from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase,
 from seal_friction_ros.core.oring_contact.oring_case import OringCase, check_pressures
 from seal_friction_ros.core.oring_contact.oring_case_file import FRICTION_COEFFICIENT, varied_ring
 from seal_friction_ros.core.oring_contact.results import oring_results
+from seal_friction_ros.core.oring_contact.ring_friction import RingLaw, friction_of_contact
 from seal_friction_ros.offline.contact.lubrication_runs import compile_for_map, row_parts
 from seal_friction_ros.offline.contact.oring_runs import Computed, sliding_contact
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty, check_unknown
@@ -81,16 +83,17 @@ def coarse_ring(case: OringCase) -> OringCase:
 
 
 class RingForces(NamedTuple):
-    """Normal force of a dry ring."""
+    """Forces of a dry ring on the wall on which it slides, at each pressure."""
 
-    normal_force: FloatArray  # [N] on the wall on which it slides, at each pressure
+    normal_force: FloatArray  # [N]
+    friction: FloatArray  # [N] NaN without a law
 
 
 class RingUncertainty(NamedTuple):
     """Uncertainty of the forces of a dry ring."""
 
     normal_force: Uncertainty
-    friction: Uncertainty | None  # None without a coefficient of friction
+    friction: Uncertainty | None  # None without a law of the friction
 
     def numbers(self) -> dict[str, Any]:
         """Numbers for JSON."""
@@ -107,15 +110,15 @@ def uncertain_ring(
 ) -> RingUncertainty:
     """Forces of samples of an O-ring at the pressures that were computed, on a coarser grid; as `uncertain_map`."""
     file, pressures = computed.file, computed.summary.pressure_Pa
-    case = coarse_ring(file.case)
+    case, law = coarse_ring(file.case), file.friction.law if file.friction else None
     names, drawn = _drawn(case.name, file.unknown, samples, seed)
 
     def parts_of(values: Mapping[str, float]) -> list[Part]:
         """The one part of a sample."""
         varied = varied_ring(case, values)
         check_pressures(varied, pressures)
-        key = part_key('ring', [asdict(varied), pressures])
-        return [Part(key, RingForces._fields, partial(ring_forces, varied, pressures))]
+        key = part_key('ring', [asdict(varied), pressures, type(law).__name__, asdict(law) if law else {}])
+        return [Part(key, RingForces._fields, partial(ring_forces, varied, pressures, law))]
 
     outcome = sampled(f'{case.name}: samples', names, drawn, parts_of, workers, work)
     forces = np.array([ring['normal_force'] for (ring,) in outcome.computed])
@@ -124,16 +127,17 @@ def uncertain_ring(
         kept = np.delete(drawn, sorted(outcome.failed), axis=0)
         factors[1:] = kept[:, names.index(FRICTION_COEFFICIENT)]
     made = partial(Uncertainty, seed, names, drawn, outcome.failed, pressures, ())
-    if file.friction is None:
+    if law is None:
         return RingUncertainty(made(forces[0], forces[1:]), None)
-    coefficient = np.vectorize(file.friction.law.coefficient_of_friction)
-    friction = factors[:, None] * coefficient(forces) * forces
+    friction = factors[:, None] * np.array([ring['friction'] for (ring,) in outcome.computed])
     return RingUncertainty(made(forces[0], forces[1:]), made(friction[0], friction[1:]))
 
 
-def ring_forces(case: OringCase, pressures: tuple[float, ...]) -> RingForces:
-    """Normal force of a ring at increasing pressures [Pa, gauge]."""
-    return RingForces(np.array([sliding_contact(case, result).force for result in oring_results(case, pressures)]))
+def ring_forces(case: OringCase, pressures: tuple[float, ...], law: RingLaw | None) -> RingForces:
+    """Forces of a ring at increasing pressures [Pa, gauge]."""
+    contacts = [sliding_contact(case, result) for result in oring_results(case, pressures)]
+    friction = [math.nan if law is None else friction_of_contact(law, contact) for contact in contacts]
+    return RingForces(np.array([contact.force for contact in contacts]), np.array(friction))
 
 
 class Sampled(NamedTuple):

@@ -3,6 +3,7 @@
 Cases of the seal of the thesis are compared with its Appendix B.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +58,24 @@ def numbers_text(computed: Computed) -> str:
             f'  area deformation gain {summary.area_deformation_gain:.4g}, F_rad of the line '
             f'{summary.radial_force_N:.4g} N'
         )
+    if summary.friction_N is not None:
+        lines.append(_friction_text(computed, summary.friction_N))
     return '\n'.join(lines)
+
+
+def _friction_text(computed: Computed, frictions: Sequence[float]) -> str:
+    """Friction of one seal in one line, and how far it may be off."""
+    summary = computed.summary
+    text = f'  friction of one seal {", ".join(f"{friction:.3g}" for friction in frictions)} N'
+    if summary.shear_stress_Pa is not None:
+        text += (
+            f', shear stress at 1 MPa {summary.shear_stress_Pa / MPA:.3g} MPa, exponent {summary.shear_exponent:.3g}'
+        )
+    text += f', relative_std {summary.friction_relative_std:.2g}'
+    if computed.readings:
+        largest = max(map(abs, summary.reading_deviations))
+        return f'{text}; {len(computed.readings)} readings, within {100.0 * largest:.1f} %'
+    return f'{text}; a --reading makes it your seal'
 
 
 @house_style()
@@ -158,7 +176,7 @@ def _thesis_table(computed: Computed) -> Table:
 
 
 def _friction_table(computed: Computed) -> Table:
-    """Friction of one seal, measured and from geometry; no rows without a measurement or a coefficient of friction."""
+    """Friction of one seal, measured and from geometry; no rows without a measurement or a law."""
     heads = ('pressure [bar]', 'measured [N]', 'from geometry [N]', 'off [%]')
     measured = computed.file.measured
     if measured is None or not computed.summary.friction_N:
@@ -175,15 +193,15 @@ def _friction_table(computed: Computed) -> Table:
 def geometry_friction(computed: Computed, pressures: FloatArray) -> FloatArray:
     """Sliding friction of one seal [N] at pressures [Pa, gauge], shape (n,); NaN outside the computed pressures.
 
-    The normal force is interpolated linearly between the computed pressures.
+    Between them the law of the seal file interpolates.
     """
-    summary, friction = computed.summary, computed.file.friction
-    if friction is None:
+    summary, law = computed.summary, computed.friction_law
+    if summary.friction_N is None:
         return np.full(len(pressures), np.nan)
     slack = 1e-6 * summary.pressure_Pa[-1]  # rounding of the file does not count
     inside = (pressures >= summary.pressure_Pa[0] - slack) & (pressures <= summary.pressure_Pa[-1] + slack)
-    normal = np.interp(pressures, summary.pressure_Pa, summary.normal_force_N)
-    return np.where(inside, [friction.law.coefficient_of_friction(force) * force for force in normal], np.nan)
+    found = summary.friction_N if law is None else [law.coulomb_friction(p) for p in pressures.clip(0.0).tolist()]
+    return np.where(inside, found, np.nan)
 
 
 def friction_deviation(computed: Computed, measured: MeasuredFriction) -> FloatArray:
@@ -314,7 +332,7 @@ def axial_force_figure(computed: Computed) -> Plot:
 
 
 def geometry_friction_figure(computed: Computed) -> Plot:
-    """Friction from geometry and a coefficient of friction, beside the measured friction."""
+    """Friction from geometry and a law, beside the measured friction."""
     summary, measured = computed.summary, computed.file.measured
     pressure, friction = np.array(summary.pressure_Pa), np.array(summary.friction_N or ())
     title = 'Friction from geometry'

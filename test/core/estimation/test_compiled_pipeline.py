@@ -101,7 +101,9 @@ SEALS |= {
 }
 
 
-OTHERS = ('power', 'from_elsewhere', 'constant', 'mapped', 'stribeck', 'ms28775_114_prior_art')
+OTHERS = (
+    'power', 'from_elsewhere', 'constant', 'mapped', 'stribeck', 'ms28775_114_prior_art', 'ms28775_114_stress',
+)  # fmt: skip
 WARM = TemperatureScale(reference=310.0, coefficient=0.013, coefficient_std=0.001, lowest=290.0, highest=340.0)
 ELASTIC = Presliding(stiffness=2e5, yield_exponent=1.5)
 SEALS |= {name: dataclasses.replace(SEALS[name], temperature=WARM, presliding=ELASTIC) for name in OTHERS}

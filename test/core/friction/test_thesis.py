@@ -1,6 +1,7 @@
 """The thesis's numbers, and that the shipped seal files still follow from its tables."""
 
 import csv
+import dataclasses
 import math
 from decimal import Decimal
 from statistics import fmean, linear_regression
@@ -58,6 +59,13 @@ def two_seals(seal, pressure: float) -> float:
 def deviations(seal) -> dict[float, float]:
     """Model over mean dynamic friction, less one."""
     return {p: two_seals(seal, p) / MEAN[p] - 1.0 for p in PRESSURES}
+
+
+STATIC = {p: fmean(readings('static', pressure_psig=p)) for p in PRESSURES}  # [lbf] both seals
+BREAKAWAY_LINE = np.linalg.lstsq(
+    np.array([(MEAN[p] / STATIC[p], 1.0 / STATIC[p]) for p in PRESSURES]), np.ones(len(PRESSURES)), rcond=None
+)[0]
+"""static = (1 + ratio) dynamic + stiction [lbf]: least squares of relative deviations"""
 
 
 # --- the tables themselves ---
@@ -226,6 +234,22 @@ def test_with_the_finite_element_force_at_no_pressure_a_power_law_misses_by_13_p
     assert max(map(abs, misses)) == pytest.approx(0.13, abs=0.005)
 
 
+def breakaway_deviations(seal) -> list[float]:
+    both = (MountedSeal(seal, 'a'), MountedSeal(seal, 'b'))
+    found = [actuator_friction(both, p * PSI, p * PSI) for p in PRESSURES]
+    return [(f.coulomb_friction + f.stiction) / LBF / STATIC[p] - 1.0 for p, f in zip(PRESSURES, found, strict=True)]
+
+
+def test_breakaway_of_the_shipped_seals_is_within_8_percent_of_the_static_friction_and_4_percent_at_no_pressure():
+    """A constant stiction of half the mean difference is 20 % too high at no pressure."""
+    for seal in (SEAL, TABLE_SEAL):
+        found = breakaway_deviations(seal)
+        assert max(map(abs, found)) < 0.08
+        assert abs(found[0]) < 0.04
+    constant = dataclasses.replace(SEAL, stiction=STICTION * LBF / 2.0, stiction_ratio=0.0)
+    assert breakaway_deviations(constant)[0] == pytest.approx(0.197, abs=0.001)
+
+
 # --- uncertainty ---
 
 
@@ -267,7 +291,8 @@ def recomputed(name: str) -> dict:
     """Every number of a shipped seal file, from the tables of the thesis."""
     common = {
         'geometry': recomputed_geometry(),
-        'stiction': STICTION * LBF / 2.0,
+        'stiction': BREAKAWAY_LINE[1] * LBF / 2.0,
+        'stiction_ratio': BREAKAWAY_LINE[0] - 1.0,
         'identified_pressure': [PRESSURES[0] * PSI, PRESSURES[-1] * PSI],
     }
     law = line()
@@ -347,4 +372,5 @@ def test_every_number_in_a_shipped_seal_file_follows_from_the_tables_to_its_last
 
 def test_every_shipped_seal_file_is_checked_here():
     shipped = {path.stem for path in (ROOT / 'config' / 'seals').glob('ms28775_114*.yaml')}
-    assert shipped - {'ms28775_114_fem'} == {'ms28775_114', 'ms28775_114_table', 'ms28775_114_prior_art'}
+    computed = {'ms28775_114_fem', 'ms28775_114_stress'}
+    assert shipped - computed == {'ms28775_114', 'ms28775_114_table', 'ms28775_114_prior_art'}

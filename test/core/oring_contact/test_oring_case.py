@@ -8,6 +8,8 @@ import pytest
 
 from seal_friction_ros.core.foundation.units import INCH, PSI
 from seal_friction_ros.core.friction.geometry import SealGeometry
+from seal_friction_ros.core.friction.laws.contact_shear import ShearLaw
+from seal_friction_ros.core.friction.laws.friction_coefficient import PowerLaw
 from seal_friction_ros.core.oring_contact.extrusion import extrusion_pressure
 from seal_friction_ros.core.oring_contact.material import (
     Rubber,
@@ -150,6 +152,11 @@ FRICTION = {
     'stiction': 2.5,
     'uncertainty': {'relative_std': 0.2},
 }
+SHEAR = {
+    'contact_shear': {'shear_stress': '0.2 MPa', 'exponent': 0.3},
+    'stiction_ratio': 0.1,
+    'uncertainty': {'relative_std': 0.2},
+}
 MEASURED = {'seals': 2, 'pressures': [0.0, 1e6], 'frictions': [10.0, 20.0]}
 
 
@@ -171,12 +178,17 @@ def test_case_file_makes_a_ring_whose_geometry_knows_its_modulus():
 
 def test_case_file_has_the_friction_of_a_seal_file_and_what_was_measured():
     file = parse_oring_case(document(friction=FRICTION, measured=MEASURED))
-    assert file.friction.law.coefficient == 2.1
-    assert file.friction.friction_coefficient == FRICTION['friction_coefficient']
+    assert file.friction.law == PowerLaw(2.1, 0.56)
     assert (file.friction.stiction, file.friction.uncertainty.relative_std) == (2.5, 0.2)
     assert file.measured == MeasuredFriction(2, (0.0, 1e6), (10.0, 20.0))
     without = {key: value for key, value in FRICTION.items() if key != 'stiction'}
     assert parse_oring_case(document(friction=without)).friction.stiction == 0.0
+
+
+def test_case_file_may_have_a_shear_law_in_the_place_of_a_coefficient():
+    friction = parse_oring_case(document(friction=SHEAR)).friction
+    assert friction.law == ShearLaw(2e5, 0.3)
+    assert (friction.stiction, friction.stiction_ratio) == (0.0, 0.1)
 
 
 @pytest.mark.parametrize(
@@ -190,8 +202,14 @@ def test_case_file_has_the_friction_of_a_seal_file_and_what_was_measured():
         ({'rubber': {'hardness': '70'}}, 'hardness'),
         ({'pressures': [1e6, 0.0]}, 'do not increase'),
         ({'pressures': None}, 'pressures'),
-        ({'friction': 0.2}, 'case mine: friction = 0.2 is not a mapping of friction_coefficient, stiction'),
-        ({'friction': FRICTION | {'stick': 1.0}}, 'is not a mapping of friction_coefficient, stiction, uncertainty'),
+        ({'friction': 0.2}, 'case mine: friction = 0.2 is not a mapping of contact_shear, friction_coefficient'),
+        ({'friction': FRICTION | {'stick': 1.0}}, 'is not a mapping of contact_shear, friction_coefficient, stiction'),
+        ({'friction': FRICTION | SHEAR}, 'give one of contact_shear and friction_coefficient; got friction_coeff'),
+        ({'friction': SHEAR | {'contact_shear': {'shear_stress': 2e5}}}, 'contact_shear lacks exponent'),
+        (
+            {'friction': SHEAR | {'contact_shear': {'shear_stress': 2e5, 'exponent': 1.1}}},
+            'exponent = 1.1 1 is above its upper bound 1.0',
+        ),
         ({'friction': FRICTION | {'stiction': -1.0}}, 'stiction = -1.0 N is below its lower bound 0.0 N'),
         ({'friction': FRICTION | {'stiction': 1.1e6}}, 'stiction = 1100000.0 N is above its upper bound 1000000.0 N'),
         ({'measured': MEASURED | {'frictions': [10.0]}}, '1 frictions at 2 pressures: give one friction per pressure'),

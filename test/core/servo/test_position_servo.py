@@ -284,9 +284,8 @@ def test_friction_that_rises_too_steeply_for_the_inner_step_is_rejected_with_the
         ServoParameters(seals=(MountedSeal(seal, 'a'),))
 
 
-ASYMMETRIC = dataclasses.replace(
-    SEAL, coulomb_law=ConstantCoulomb(10.0), stiction=0.5, velocity_terms=VelocityTerms(asymmetry=0.3)
-)
+CONSTANT = dataclasses.replace(SEAL, coulomb_law=ConstantCoulomb(10.0), stiction=0.0, stiction_ratio=0.0)
+ASYMMETRIC = dataclasses.replace(CONSTANT, stiction=0.5, velocity_terms=VelocityTerms(asymmetry=0.3))
 CALM = {
     'valve': ServoValve(null_leakage=0.0, rated_flow=1e-8),
     'cylinder': Cylinder(internal_leakage=1e-8, stroke=0.2, dead_volume=1e-2),  # both chambers at one pressure
@@ -308,8 +307,7 @@ def test_a_rod_is_held_by_the_larger_of_breakaway_and_slowest_friction_of_the_di
 
 @pytest.mark.parametrize('side', [1.0, -1.0])
 def test_a_rod_without_stiction_is_held_by_exactly_its_friction(side):
-    seal = dataclasses.replace(SEAL, coulomb_law=ConstantCoulomb(10.0), stiction=0.0)
-    servo = ServoParameters(**(CALM | {'seals': (MountedSeal(seal, 'a'),)}))
+    servo = ServoParameters(**(CALM | {'seals': (MountedSeal(CONSTANT, 'a'),)}))
     for force, moves in ((10.0, False), (10.001, True)):
         state = init(servo).plant
         for _ in range(20):
@@ -328,7 +326,7 @@ def test_a_sliding_rod_has_the_friction_of_its_direction(side, elastic):
     friction, coulomb = track.friction_force[-1], track.coulomb_friction[-1]
     assert coulomb > 10.0
     assert friction == pytest.approx(side * (1.0 + 0.3 * side) * coulomb, rel=1e-6)
-    assert track.breakaway_force[-1] == pytest.approx(coulomb + 2.0 * SEAL.stiction)
+    assert track.breakaway_force[-1] == pytest.approx((1.0 + SEAL.stiction_ratio) * coulomb + 2.0 * SEAL.stiction)
     # m a = F - b v - friction; the oil takes no more than a hundredth
     acceleration = (track.velocity[-1] - track.velocity[-2]) / servo.control_period
     assert 5.0 * acceleration == pytest.approx(side * 300.0 - friction - 20.0 * track.velocity[-1], rel=0.01)

@@ -138,7 +138,7 @@ def test_progress_is_one_step_a_pressure(tmp_path: Path, monkeypatch: pytest.Mon
         ({'numerics': {'lines': 3}}, 'numerics: OringNumerics.lines = 3  is below its lower bound 9'),
         ({'pressures': [0.0, 1e8]}, 'extrudes the ring'),
         ({'pressures': 'all'}, "pressures = 'all' is not a list"),
-        ({'friction': {'stiction': 1.0}}, 'friction_coefficient = None is not a mapping'),
+        ({'friction': {'stiction': 1.0}}, 'give one of contact_shear and friction_coefficient; got stiction'),
         ({'measured': {'seals': 1, 'pressures': [1.0], 'frictions': []}}, '0 frictions at 1 pressures'),
     ],
 )
@@ -157,12 +157,12 @@ def test_commands_and_case_file_of_the_docs_work(tmp_path: Path, monkeypatch: py
     page = (ROOT / 'docs' / 'oring.md').read_text()
     with_package, *own = re.findall(r'^\.venv/bin/seal_friction (oring .*?) +#', page, re.MULTILINE)
     assert f'seal_friction {with_package}\n' in (ROOT / 'README.md').read_text()  # where all commands are run
-    assert len(own) == 3
+    assert len(own) == 5
     monkeypatch.chdir(tmp_path)
     (case,) = re.findall(r'```yaml\n(.*?)```', page, re.DOTALL)
     Path('my_case.yaml').write_text(f'{case}numerics: {{lines: 9}}\n')
     Path('build').mkdir()
-    assert [main(command.replace('--uncertain 100', '--uncertain 2').split()) for command in own] == [0, 0, 0]
+    assert [main(command.replace('--uncertain 100', '--uncertain 2').split()) for command in own] == [0] * 5
     assert parse_seal(read_yaml(Path('build/my_seal.yaml'))).name == 'my_ring'
 
 
@@ -215,17 +215,75 @@ def test_a_seal_file_that_is_there_is_not_overwritten_and_nothing_is_computed_fi
     assert out.read_text() == 'mine'
 
 
+PRESSURE, SPEED, FRICTION = 1.7e6, 0.01, 8.0  # [Pa], [m/s], [N]
+
+
+def read(path: Path):
+    return parse_seal(read_yaml(path))
+
+
+def test_one_reading_makes_a_seal_file_with_that_friction_and_15_percent(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    path, out = written(tmp_path, document(friction=None, unknown=None)), tmp_path / 'seal.yaml'
+    assert main(['oring', str(path), '--reading', '17 bar, 10mm/s,8N', '--out', str(out), '--json']) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found['friction_N'][1] == pytest.approx(FRICTION)
+    assert found['reading_deviations'] == pytest.approx([0.0], abs=1e-9)
+    seal = read(out)
+    assert seal.coulomb_law.coulomb_friction(PRESSURE) == pytest.approx(FRICTION, rel=1e-5)
+    assert seal.coulomb_law.shear_stress == pytest.approx(found['shear_stress_Pa'])
+    assert seal.uncertainty.relative_std == 0.15
+    assert (seal.identified_motion.slowest, seal.identified_motion.fastest) == (SPEED, SPEED)
+
+
+def test_without_friction_or_reading_the_seal_file_is_a_prior_with_a_factor_of_three(tmp_path: Path):
+    path, out = written(tmp_path, document(friction=None, unknown=None)), tmp_path / 'seal.yaml'
+    assert main(['oring', str(path), '--out', str(out)]) == 0
+    seal = read(out)
+    assert seal.uncertainty.relative_std == 2.0
+    assert seal.stiction_ratio > 0.0
+    thesis = read(ROOT / 'config' / 'seals' / 'ms28775_114_stress.yaml').coulomb_law
+    assert seal.coulomb_law.coulomb_friction(PRESSURE) == pytest.approx(thesis.coulomb_friction(PRESSURE), rel=0.05)
+
+
+def test_the_law_of_a_seal_makes_the_seal_of_another_size(tmp_path: Path):
+    first, second = tmp_path / 'seal.yaml', tmp_path / 'large.yaml'
+    assert main(['oring', str(written(tmp_path, document())), '--reading', '1.7e6,0.01,8', '--out', str(first)]) == 0
+    geometry = dict(document()['geometry'])
+    gap = geometry['gland_diameter'] - geometry['rod_diameter']
+    geometry |= {key: 2.0 * geometry[key] for key in ('rod_diameter', 'ring_inner_diameter')}
+    large = written(tmp_path, document(geometry=geometry | {'gland_diameter': geometry['rod_diameter'] + gap}))
+    assert main(['oring', str(large), '--law-from', str(first), '--out', str(second)]) == 0
+    seal = read(second)
+    assert seal.coulomb_law.coulomb_friction(PRESSURE) == pytest.approx(2.0 * FRICTION, rel=0.03)
+    assert seal.uncertainty.relative_std == 2.0
+
+
 @pytest.mark.parametrize(
-    ('changes', 'message'),
+    ('more', 'message'),
     [
-        ({'friction': None, 'unknown': None}, 'needs the section friction'),
-        ({'pressures': [0.0]}, 'needs two pressures at least'),
+        (['--reading', '1e6,0.01'], '1e6,0.01 is not 3 values, separated by commas'),
+        (['--reading', '1e6,10 kg,5'], "unit 'kg' is none of a velocity"),
+        (['--reading=-1,0.01,5'], '-1 is not a finite number of at least 0'),
+        (['--reading', '5e6,0.01,5'], 'are outside the computed 0 to 1.7e+06 Pa: give --pressures'),
+        (['--reading', '1e6,0.01,5', '--uncertain', '2'], '--uncertain is for a ring without a --reading'),
+        (['--law-from', 'ms28775_114'], 'its physics_based is for its own size'),
     ],
 )
-def test_a_seal_file_needs_friction_and_two_pressures(
-    changes: dict, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_a_reading_or_law_that_cannot_be_used_is_said_in_one_line(
+    more: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):
-    path = written(tmp_path, document(**changes))
-    assert main(['oring', str(path), '--out', str(tmp_path / 'seal.yaml')]) == 2
+    try:
+        code = main(['oring', str(written(tmp_path, document())), *more])
+    except SystemExit as end:
+        code = end.code
+    assert code == 2
     assert message in capsys.readouterr().err
+
+
+def test_a_seal_file_needs_two_pressures(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    path = written(tmp_path, document(pressures=[0.0]))
+    assert main(['oring', str(path), '--out', str(tmp_path / 'seal.yaml')]) == 2
+    assert 'needs two pressures at least' in capsys.readouterr().err
     assert not (tmp_path / 'seal.yaml').exists()

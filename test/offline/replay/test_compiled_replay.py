@@ -138,7 +138,7 @@ PAIRS = [
     ('ms28775_114', 'delft_o_ring'),
     ('placeholder', 'placeholder'),
     ('ms28775_114_table', 'ms28775_114_prior_art'),
-    ('ms28775_114_fem', 'ms28775_114_prior_art'),
+    ('ms28775_114_fem', 'ms28775_114_stress'),
 ]
 """Seals of an actuator; pairs of the same laws share their compiled code."""
 

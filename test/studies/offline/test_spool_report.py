@@ -5,8 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from harness.closed_loop_bags import write_closed_loop
+from harness.compensation import SCALE
 from harness.report_page import checked_page
+from harness.spool_program import spool_cycles
 
+from seal_friction_ros.offline.bags.recorded_run import read_run
 from seal_friction_ros.offline.commands.main import main
 
 RATE, FRICTION = 5000.0, 2.5  # [Hz], [N]
@@ -50,6 +54,19 @@ def test_another_reference_scales_the_result(tmp_path, capsys):
     _, own = run(tmp_path, capsys, table(tmp_path / 'log.csv'))
     _, given = run(tmp_path, capsys, tmp_path / 'log.csv', '--reference', '5.0')
     assert given['highest_normalised'] == pytest.approx(own['highest_normalised'] * own['reference_force_N'] / 5.0)
+
+
+def test_a_bag_of_the_cycles_is_evaluated_as_their_table(tmp_path, capsys):
+    wave = spool_cycles(1.8e-3)
+    bag = write_closed_loop(tmp_path / 'bag', scales=(SCALE,), seconds=wave.duration, waves=(wave,))
+    code, numbers = run(tmp_path, capsys, bag)
+    assert code == 0, numbers
+    assert numbers['stroke_m'] == pytest.approx(1.8e-3, rel=0.05)
+    recorded = read_run(bag)
+    slides = np.abs(recorded.velocity) > 0.03
+    assert numbers['reference_force_N'] == pytest.approx(recorded.coulomb_friction[slides].mean(), rel=0.15)
+    page = checked_page(tmp_path / 'page.html')
+    assert page.figures == ['friction_over_displacement']
 
 
 @pytest.mark.parametrize(

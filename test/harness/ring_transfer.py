@@ -1,0 +1,146 @@
+"""Friction of one ring from another ring or from one reading: the shear law beside a constant and mu N."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from paths import ROOT
+from scipy.signal import savgol_filter
+
+from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.units import BAR
+from seal_friction_ros.core.oring_contact.oring_case import OringNumerics
+from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
+from seal_friction_ros.core.oring_contact.results import WallContact, oring_results
+from seal_friction_ros.core.oring_contact.ring_friction import (
+    PRIOR_LAW,
+    Reading,
+    RingLaw,
+    fit_shear_law,
+    friction_law,
+)
+from seal_friction_ros.files import config_path, read_yaml
+from seal_friction_ros.offline.contact.oring_runs import sliding_contact
+
+DELFT = ROOT.parent / 'shared' / 'data' / 'delft'
+LOGS = [f'O-ring257_{run}{bar}bar.csv' for run in ('', 'run2_') for bar in (1, 3, 5, 7)]
+
+
+class Ring(NamedTuple):
+    """A computed ring and readings of its friction."""
+
+    case: str
+    pressures: tuple[float, ...]  # [Pa] computed
+    contacts: list[WallContact]
+    readings: list[Reading]
+
+    @property
+    def frictions(self) -> FloatArray:
+        """Friction of each reading [N]."""
+        return np.array([reading.friction for reading in self.readings])
+
+    def predicted(self, law: RingLaw) -> FloatArray:
+        """Friction by a law at the pressure of each reading [N]."""
+        geometry = parse_oring_case(read_yaml(config_path('oring', self.case))).case.geometry
+        over_pressure = friction_law(law, geometry, self.pressures, self.contacts)
+        return np.array([over_pressure.coulomb_friction(reading.pressure) for reading in self.readings])
+
+    def normal_forces(self) -> FloatArray:
+        """Normal force at the pressure of each reading [N]."""
+        forces = [contact.force for contact in self.contacts]
+        return np.interp([reading.pressure for reading in self.readings], self.pressures, forces)
+
+
+def ring_of(case: str, lines: int) -> Ring:
+    """A case of the package with its own readings, on a mesh of ``lines``."""
+    file = parse_oring_case(read_yaml(config_path('oring', case)))
+    coarse = dataclasses.replace(file.case, numerics=OringNumerics(lines=lines))
+    results = list(oring_results(coarse, file.pressures))
+    measured = file.measured
+    assert measured is not None
+    readings = [
+        Reading(pressure, 0.01, friction / measured.seals)
+        for pressure, friction in zip(measured.pressures, measured.frictions, strict=True)
+    ]
+    return Ring(case, file.pressures, [sliding_contact(coarse, result) for result in results], readings)
+
+
+def fitted(ring: Ring, readings: Sequence[Reading], prior: RingLaw = PRIOR_LAW) -> RingLaw:
+    """Shear law of some readings of a ring."""
+    return fit_shear_law(prior, ring.pressures, ring.contacts, readings).law
+
+
+def off(predicted: FloatArray, ring: Ring) -> FloatArray:
+    """Deviation from the readings [%]."""
+    return 100.0 * (predicted / ring.frictions - 1.0)
+
+
+def without_reading(source: Ring, target: Ring) -> dict[str, FloatArray]:
+    """Deviation [%] of the friction of a ring by what readings of another one tell, by model."""
+    coefficient = float(np.mean(source.frictions / source.normal_forces()))
+    return {
+        'shear law': off(target.predicted(fitted(source, source.readings)), target),
+        'mu N': off(coefficient * target.normal_forces(), target),
+        'constant': off(np.full(len(target.readings), source.frictions.mean()), target),
+    }
+
+
+def with_one_reading(target: Ring, prior: RingLaw = PRIOR_LAW) -> dict[str, FloatArray]:
+    """The same after each reading alone, by model: row i has the deviations [%] after reading i."""
+    normal, friction = target.normal_forces(), target.frictions
+    return {
+        'shear law': np.array([off(target.predicted(fitted(target, [r], prior)), target) for r in target.readings]),
+        'mu N': np.array([off(f / n * normal, target) for f, n in zip(friction, normal, strict=True)]),
+        'constant': np.array([off(np.full(len(friction), f), target) for f in friction]),
+    }
+
+
+def of_others(deviations: FloatArray) -> FloatArray:
+    """Magnitudes without those of the reading itself, shape (n, n - 1)."""
+    n = len(deviations)
+    return np.abs(deviations)[~np.eye(n, dtype=bool)].reshape(n, n - 1)
+
+
+def delft_reading(path: Path) -> Reading:
+    """Reading of a log: half the difference of both directions, sliding faster than 3 mm/s."""
+    table = np.loadtxt(path)[15:]
+    step = float(np.median(np.diff(table[:, 0]))) * 1e-3  # [s]
+    velocity = savgol_filter(table[:, 4] * 1e-3, round(0.2 / step) | 1, 2, deriv=1, delta=step)
+    force = table[:, 5] * BAR * math.pi / 4.0 * 0.0257**2 - table[:, 6]
+    extends, retracts = velocity < -3e-3, velocity > 3e-3
+    slides = extends | retracts
+    friction = 0.5 * float(force[extends].mean() - force[retracts].mean())
+    return Reading(float(np.median(table[slides, 5])) * BAR, float(np.median(np.abs(velocity[slides]))), friction)
+
+
+def summary(deviations: FloatArray) -> dict[str, float]:
+    """Mean and largest magnitude [%]."""
+    return {'mean [%]': float(np.abs(deviations).mean()), 'worst [%]': float(np.abs(deviations).max())}
+
+
+def transfer_rows(lines: int = 33) -> list[dict[str, float | str]]:
+    """The transfer tests of docs/oring.md, model by model."""
+    thesis, delft = ring_of('ms28775_114', lines), ring_of('delft_o_ring', lines)
+    rows: list[dict[str, float | str]] = []
+    for name, source, target in (('thesis to Delft', thesis, delft), ('Delft to thesis', delft, thesis)):
+        rows += [
+            {'test': f'{name}, no reading', 'model': model, **summary(found)}
+            for model, found in without_reading(source, target).items()
+        ]
+        for model, found in with_one_reading(target, fitted(source, source.readings)).items():
+            rows.append({'test': f'{name}, one reading', 'model': model, **summary(of_others(found))})
+    own = fitted(thesis, thesis.readings)
+    rows.append({'test': 'thesis, all readings', 'model': 'shear law', **summary(off(thesis.predicted(own), thesis))})
+    for model, found in with_one_reading(thesis).items():
+        for psi, others in zip(range(0, 1001, 100), of_others(found), strict=True):
+            rows.append({'test': f'thesis, reading at {psi} psi', 'model': model, **summary(others)})
+    if DELFT.exists():
+        logs = delft._replace(readings=[delft_reading(DELFT / log) for log in LOGS])
+        for model, found in with_one_reading(logs).items():
+            others = of_others(found)
+            worst = {'mean [%]': float(others.mean(axis=1).max()), 'worst [%]': float(others.max())}
+            rows.append({'test': 'one Delft log, the other seven', 'model': model, **worst})
+    return rows
