@@ -15,9 +15,13 @@ from seal_friction_ros.core.foundation.errors import NotConvergedError
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.presliding import presliding_of_map
 from seal_friction_ros.core.lubrication.friction_map import (
+    PERCOLATION,
+    THINNEST_OF_CLOSURES,
     MemoryLength,
     SteadyFriction,
+    carries_film,
     friction_map,
+    live_map,
     map_pressures,
     memory_length,
     steady_friction,
@@ -32,6 +36,8 @@ from seal_friction_ros.offline.work.seal_writer import rounded
 
 Parsed = TypeVar('Parsed')
 _FEWEST_CELLS = 32  # that a case may have
+STICTION_OF_A_RING = 0.13
+"""[-] breakaway over sliding friction, less 1, of a map without speeds: mean of the thesis (our choice)"""
 
 
 def load_case(name: str) -> LubricationCase:
@@ -84,6 +90,23 @@ class MapRuns(NamedTuple):
     retried_steps: int  # steps that did not converge and were repeated in halves
     uncertainty: Uncertainty | None = None  # None: no samples
 
+    @property
+    def limits(self) -> str:
+        """Where the film is out of its range, as a sentence; empty where it is not."""
+        touching, thinnest = max(row.real_contact for row in self.rows), min(row.thinnest for row in self.rows)
+        if not carries_film(self.rows):
+            return (
+                f'At rest {touching:.2g} of the seal touches; above {PERCOLATION:g} no lubricant gets under it. So the '
+                'change with speed is not in the seal file: the friction is that at '
+                f'{1e3 * self.law.reference_speed:g} mm/s at every speed.'
+            )
+        if thinnest < THINNEST_OF_CLOSURES:
+            return (
+                f'At rest the gap is {thinnest:.2g} of the roughness; the flow factors hold from '
+                f'{THINNEST_OF_CLOSURES:g}.'
+            )
+        return ''
+
     def numbers(self) -> dict[str, Any]:
         """Numbers for JSON."""
         return {
@@ -94,6 +117,9 @@ class MapRuns(NamedTuple):
             'solid_share': [(row.solid / row.friction).tolist() for row in self.rows],
             'memory_length_m': self.law.memory_length,
             'presliding_length_m': self.law.presliding_length,
+            'real_contact_at_rest': [row.real_contact for row in self.rows],
+            'gap_over_roughness_at_rest': [row.thinnest for row in self.rows],
+            'speeds_in_seal_file': carries_film(self.rows),
             'retried_steps': self.retried_steps,
             **({} if self.uncertainty is None else {'uncertainty': self.uncertainty.numbers()}),
         }
@@ -103,7 +129,8 @@ class MapRuns(NamedTuple):
         low, high = min(self.law.frictions), max(self.law.frictions)
         size = f'{len(self.law.speeds)} speeds x {len(self.law.pressures)} pressures'
         sampled = '' if self.uncertainty is None else f'\n{self.uncertainty.summary()}'
-        return f'{self.case.name}: {size}, {low:.3g} to {high:.3g} N{sampled}'
+        limits = f'\n{self.limits}' if self.limits else ''
+        return f'{self.case.name}: {size}, {low:.3g} to {high:.3g} N{limits}{sampled}'
 
 
 def run_map(case: LubricationCase, workers: Workers, work: Path | None = None) -> MapRuns:
@@ -138,21 +165,22 @@ def seal_document(computed: MapRuns, name: str) -> dict[str, Any]:
 
     The uncertainty is that of the samples. Without samples it is our choice, since nothing is measured here: one tenth
     of the friction; of an O-ring from its drawing 0.7, the error that was found against readings (docs/ehl.md). The
-    breakaway friction is the friction at the
-    lowest speed of the map over that at its reference speed, mean over the pressures.
+    breakaway friction is the friction at the lowest speed of the map over that at its reference speed, mean over the
+    pressures; of a map without speeds `STICTION_OF_A_RING`.
     """
-    law, case = computed.law, computed.case
+    case, law = computed.case, live_map(computed.law, computed.rows)
     if computed.uncertainty is None:
         relative_std = 0.7 if case.oring else 0.1
     else:
         relative_std = rounded(computed.uncertainty.relative_std, 3)
     creeping = fmean(law.sliding_friction(p, law.speeds[0]) / law.coulomb_friction(p) for p in law.pressures)
+    stiction = max(0.0, creeping - 1.0) if law.depends_on_speed else STICTION_OF_A_RING
     pressures = [rounded(value, 7) for value in law.pressures]
     elastic = presliding_of_map(law)
     document: dict[str, Any] = {
         'name': name,
         'source': f'computed by seal_friction ehl map from the case {case.name}; '
-        'steady sliding, mean of both directions',
+        f'steady sliding, mean of both directions. {computed.limits}'.strip(),
         'coulomb_law': 'friction_map',
         'friction_map': {
             'speeds': [rounded(value, 13) for value in law.speeds],  # their ratios have to be equal
@@ -162,7 +190,7 @@ def seal_document(computed: MapRuns, name: str) -> dict[str, Any]:
             'memory_length': rounded(law.memory_length, 7),
             'presliding_length': rounded(law.presliding_length, 7),
         },
-        'stiction_ratio': rounded(max(0.0, creeping - 1.0), 3),
+        'stiction_ratio': rounded(stiction, 3),
         'uncertainty': {'relative_std': relative_std},
         'identified_pressure': [pressures[0], pressures[-1]],
     }

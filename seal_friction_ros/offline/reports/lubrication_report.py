@@ -40,7 +40,7 @@ def write_map_page(computed: MapRuns, out: Path) -> tuple[Path, ...]:
         None if computed.uncertainty is None else computed.uncertainty.relative_std,
         '--seal-file' in command_line(),
     )
-    values = {'verdict': verdict, 'law': computed.law, 'map_table': table}
+    values = {'verdict': verdict, 'law': computed.law, 'map_table': table, 'limits': computed.limits}
     values |= uncertainty_values(computed.uncertainty, computed.case.unknown)
     return write_case_page(out, 'lubrication_map', plots, computed.case, **values)
 

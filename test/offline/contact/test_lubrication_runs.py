@@ -58,7 +58,13 @@ def test_an_o_ring_becomes_a_seal_file_from_its_drawing_that_the_node_takes(ring
     table = np.array(found['friction_N'])
     assert (np.diff(table, axis=0) > 0.0).all()
     seal = parse_seal(read_yaml(written))
-    assert seal.coulomb_law.sliding_friction(1e6, 1e-3) == pytest.approx(table[1, 0], rel=1e-3)
+    at_reference = seal.coulomb_law.coulomb_friction(1e6)  # 34 mm/s, between the second and the third speed
+    assert table[1, 2] < at_reference < table[1, 1]
+    assert [seal.coulomb_law.sliding_friction(1e6, speed) for speed in (1e-3, 0.1)] == [at_reference] * 2
+    assert not found['speeds_in_seal_file']
+    assert max(found['real_contact_at_rest']) > 0.42
+    assert 'no lubricant gets under it' in read_yaml(written)['source']
+    assert seal.stiction_ratio == 0.13
     assert seal.presliding is not None
     assert main(['charts', str(written), '--out', str(tmp_path / 'charts.html')]) == 0
 

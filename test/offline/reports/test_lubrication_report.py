@@ -22,7 +22,16 @@ def computed_map() -> MapRuns:
     law = FrictionMap(speeds, pressures, (0.9, 0.7, 0.4, 1.1, 0.8, 0.4), 1e-2, 2.2e-4, 4.2e-5)
     frictions = np.array(law.frictions).reshape(2, 3)
     rows = [
-        SteadyFriction(**{**dict.fromkeys(SteadyFriction._fields), 'pressure': p, 'friction': f, 'solid': 0.9 * f})
+        SteadyFriction(
+            pressure=p,
+            friction=f,
+            solid=0.9 * f,
+            direction_difference=0.0 * f,
+            stiffness=2e4,
+            retried_steps=0,
+            real_contact=0.1,
+            thinnest=0.8,
+        )
         for p, f in zip(pressures, frictions, strict=True)
     ]
     return MapRuns(CASE, law, rows, 0)
@@ -34,6 +43,18 @@ def test_a_map_shows_friction_by_speed_and_pressure(tmp_path):
     assert page.figures == ['friction_map']
     assert list(page.table('speed [mm/s]')[0].values()) == ['1.00', '0.900', '1.100']
     assert page.tiles['distance before the seal slides'] == '0.042 mm'
+
+
+def test_a_map_says_where_no_lubricant_gets_under_the_seal_and_where_the_flow_factors_end(tmp_path):
+    computed = computed_map()
+    for name, changes, words in (
+        ('sealed', {'real_contact': 0.9}, 'above 0.42 no lubricant gets under it'),
+        ('thin', {'thinnest': 0.3}, 'the gap is 0.3 of the roughness'),
+    ):
+        rows = [*computed.rows[:1], computed.rows[1]._replace(**changes)]
+        report.write_map_page(computed._replace(rows=rows), tmp_path / f'{name}.html')
+        assert any(words in text for text in checked_page(tmp_path / f'{name}.html').texts['p.note'])
+    assert computed.limits == ''
 
 
 def test_a_map_with_samples_shows_what_is_unknown_its_quantiles_and_what_failed(tmp_path):
