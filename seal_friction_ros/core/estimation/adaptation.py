@@ -381,12 +381,16 @@ def adapted_friction(
     std = std if std > LEAST_STD * law else LEAST_STD * law
     if not uses or not is_proven(known):
         wider = (missed + ONE_SIDED_95 * std) / BAND_95
-        coulomb, _, stiction, in_identified_range, added = friction
-        return ActuatorFriction(coulomb, std if std > wider else wider, stiction, in_identified_range, added), 0.0
+        coulomb, _, stiction, in_identified_range, added, asymmetry = friction
+        std = std if std > wider else wider
+        return ActuatorFriction(coulomb, std, stiction, in_identified_range, added, asymmetry), 0.0
     at_no_speed = bounded_friction(settings, known, moment.direction, 0.0, friction.coulomb_friction)
-    stiction = friction.stiction * (sliding / law if law > 0.0 else 1.0)
+    factor = sliding / law if law > 0.0 else 1.0
+    stiction, asymmetry = friction.stiction * factor, friction.breakaway_asymmetry * factor
     taken_off = offset_here(state) if moment.direction == 0.0 else 0.0
-    adapted = ActuatorFriction(at_no_speed, std, stiction, friction.in_identified_range, sliding - at_no_speed)
+    adapted = ActuatorFriction(
+        at_no_speed, std, stiction, friction.in_identified_range, sliding - at_no_speed, asymmetry
+    )
     return adapted, taken_off
 
 

@@ -232,6 +232,24 @@ def live_map(law: FrictionMap, rows: Sequence[SteadyFriction]) -> FrictionMap:
     return dataclasses.replace(law, frictions=_levelled(law))
 
 
+def pressure_asymmetry(law: FrictionMap, rows: Sequence[SteadyFriction]) -> float:
+    """Share by which the friction is larger towards the highest pressure than the mean [-], and smaller away from it.
+
+    Half the difference of the directions over their sum at the reference speed grows with the pressure; the share is
+    that at the highest pressure of the line through 0 that fits it best (least squares).
+    """
+    loaded = np.array([row.pressure for row in rows]) / law.pressures[-1]
+    shares = [directions(row, law.reference_speed, law.speeds) for row in rows]
+    uneven = np.array([0.5 * (towards - away) / (0.5 * (towards + away)) for towards, away in shares])
+    return float(uneven @ loaded / (loaded @ loaded))
+
+
+def directions(row: SteadyFriction, speed: float, speeds: Sequence[float]) -> tuple[float, float]:
+    """Friction [N] towards the pressure and away from it at a ``speed`` [m/s], ``speeds`` being those of the row."""
+    mean, difference = (np.interp(math.log(speed), np.log(speeds), v) for v in (row.friction, row.direction_difference))
+    return float(mean + 0.5 * difference), float(mean - 0.5 * difference)
+
+
 def _levelled(law: FrictionMap) -> tuple[float, ...]:
     table = np.reshape(law.frictions, (len(law.pressures), -1))
     at_reference = np.array([law.coulomb_friction(pressure) for pressure in law.pressures])

@@ -20,10 +20,12 @@ from seal_friction_ros.core.lubrication.friction_map import (
     MemoryLength,
     SteadyFriction,
     carries_film,
+    directions,
     friction_map,
     live_map,
     map_pressures,
     memory_length,
+    pressure_asymmetry,
     steady_friction,
 )
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, parse_lubrication_case, varied_case
@@ -36,6 +38,7 @@ from seal_friction_ros.offline.work.seal_writer import rounded
 
 Parsed = TypeVar('Parsed')
 _FEWEST_CELLS = 32  # that a case may have
+LEAST_ASYMMETRY = 0.01  # [-] that a seal file has: less is an error of the mesh (our choice)
 STICTION_OF_A_RING = 0.13
 """[-] breakaway over sliding friction, less 1, of a map without speeds: mean of the thesis (our choice)"""
 
@@ -91,6 +94,11 @@ class MapRuns(NamedTuple):
     uncertainty: Uncertainty | None = None  # None: no samples
 
     @property
+    def directions(self) -> list[tuple[float, float]]:
+        """Friction [N] towards the pressure and away from it at the reference speed, at each pressure."""
+        return [directions(row, self.law.reference_speed, self.law.speeds) for row in self.rows]
+
+    @property
     def limits(self) -> str:
         """Where the film is out of its range, as a sentence; empty where it is not."""
         touching, thinnest = max(row.real_contact for row in self.rows), min(row.thinnest for row in self.rows)
@@ -114,6 +122,9 @@ class MapRuns(NamedTuple):
             'speed_m_s': self.law.speeds,
             'pressure_Pa': self.law.pressures,
             'friction_N': [row.friction.tolist() for row in self.rows],
+            'towards_pressure_N': [towards for towards, _ in self.directions],
+            'away_from_pressure_N': [away for _, away in self.directions],
+            'pressure_asymmetry': pressure_asymmetry(self.law, self.rows),
             'solid_share': [(row.solid / row.friction).tolist() for row in self.rows],
             'memory_length_m': self.law.memory_length,
             'presliding_length_m': self.law.presliding_length,
@@ -194,6 +205,9 @@ def seal_document(computed: MapRuns, name: str) -> dict[str, Any]:
         'uncertainty': {'relative_std': relative_std},
         'identified_pressure': [pressures[0], pressures[-1]],
     }
+    asymmetry = rounded(pressure_asymmetry(computed.law, computed.rows), 3)
+    if abs(asymmetry) >= LEAST_ASYMMETRY:
+        document['pressure_asymmetry'] = {'asymmetry': asymmetry, 'full_pressure': pressures[-1]}
     if elastic is not None:
         numbers = asdict(elastic)
         document['presliding'] = {key: n if key == 'elements' else rounded(n, 7) for key, n in numbers.items()}

@@ -29,6 +29,11 @@ def write_map_page(computed: MapRuns, out: Path) -> tuple[Path, ...]:
         (number(speed / MM), *(number(float(row.friction[i]), 3) for row in computed.rows))
         for i, speed in enumerate(computed.law.speeds)
     ]
+    reference = f'{number(computed.law.reference_speed / MM)}'
+    rows += [
+        (f'{reference}, {text}', *(number(each[k], 3) for each in computed.directions))
+        for k, text in enumerate(('towards the pressure', 'away from it'))
+    ]
     table = Table(heads, rows)
     plots = [map_figure(computed)]
     if computed.uncertainty is not None:

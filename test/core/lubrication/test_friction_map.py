@@ -114,6 +114,22 @@ def test_a_ring_that_lets_no_lubricant_in_has_one_friction_at_all_speeds(ring_ro
     assert live.frictions[0] / live.presliding_length == pytest.approx(stiffness)
 
 
+def test_the_share_of_a_direction_is_that_of_the_line_through_no_pressure():
+    """At 10 mm/s: 12 N towards and 8 N away at 1e5 Pa, where the mean is 10 N; half the share at half the pressure."""
+    law = dataclasses.replace(LAW, pressures=(0.0, 0.5e5, 1e5), frictions=(10.0,) * 9)
+    rows = [
+        module.SteadyFriction(p, np.full(3, 10.0), np.full(3, 9.0), np.array([0.0, d, 2.0 * d]), 2e4, 0)
+        for p, d in ((0.0, 0.0), (0.5e5, 2.0), (1e5, 4.0))
+    ]
+    assert module.directions(rows[2], 1e-2, law.speeds) == pytest.approx((12.0, 8.0))
+    assert module.pressure_asymmetry(law, rows) == pytest.approx(0.2)
+
+
+def test_a_ring_rubs_less_towards_its_pressure(ring_row):
+    case, rows = ring_row
+    assert -0.9 < module.pressure_asymmetry(friction_map(case, rows, 1e-4), rows) < -0.01
+
+
 def test_a_seal_that_lets_lubricant_in_keeps_its_speeds(rows):
     assert module.carries_film(rows)
     law = friction_map(CASE, rows, 1e-4)

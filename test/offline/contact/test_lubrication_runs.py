@@ -34,10 +34,11 @@ def test_recording_with_a_mapped_seal_replays_to_the_same_bytes_and_rubs_less_th
     speed, friction = np.abs(recorded.velocity), np.abs(recorded.friction_force)
     shears = recorded.status & int(Status.PRESLIDING) != 0  # the map tells how far the seal shears before it slides
     assert shears.any()
-    sliding = (recorded.state == FrictionState.SLIDING) & ~shears
-    slow, fast = sliding & (speed < 15e-3), sliding & (speed > 30e-3)
-    assert friction[slow].min() > friction[fast].max()
-    assert friction[slow].mean() > 1.1 * friction[fast].mean()  # it follows the speed over a length, by the map
+    for direction in (-1, 1):  # towards the pressure and away from it
+        sliding = (recorded.state == FrictionState.SLIDING) & ~shears & (recorded.direction == direction)
+        slow, fast = sliding & (speed < 15e-3), sliding & (speed > 30e-3)
+        assert friction[slow].min() > friction[fast].max()
+        assert friction[slow].mean() > 1.1 * friction[fast].mean()  # it follows the speed over a length, by the map
     assert np.ptp(recorded.coulomb_friction) == 0.0  # that of the pressure alone, at the reference speed
 
 
@@ -65,6 +66,10 @@ def test_an_o_ring_becomes_a_seal_file_from_its_drawing_that_the_node_takes(ring
     assert max(found['real_contact_at_rest']) > 0.42
     assert 'no lubricant gets under it' in read_yaml(written)['source']
     assert seal.stiction_ratio == 0.13
+    assert found['towards_pressure_N'][1] < at_reference < found['away_from_pressure_N'][1]
+    assert seal.pressure_asymmetry.full_pressure == 1e6
+    half = found['away_from_pressure_N'][1] - found['towards_pressure_N'][1]
+    assert seal.pressure_asymmetry.asymmetry == pytest.approx(-0.5 * half / at_reference, abs=1e-3)
     assert seal.presliding is not None
     assert main(['charts', str(written), '--out', str(tmp_path / 'charts.html')]) == 0
 

@@ -26,7 +26,7 @@ def computed_map() -> MapRuns:
             pressure=p,
             friction=f,
             solid=0.9 * f,
-            direction_difference=0.0 * f,
+            direction_difference=np.full(3, -1e-6 * p),
             stiffness=2e4,
             retried_steps=0,
             real_contact=0.1,
@@ -42,6 +42,8 @@ def test_a_map_shows_friction_by_speed_and_pressure(tmp_path):
     page = checked_page(tmp_path / 'map.html')
     assert page.figures == ['friction_map']
     assert list(page.table('speed [mm/s]')[0].values()) == ['1.00', '0.900', '1.100']
+    assert list(page.table('speed [mm/s]')[-2].values()) == ['10.00, towards the pressure', '0.700', '0.750']
+    assert list(page.table('speed [mm/s]')[-1].values()) == ['10.00, away from it', '0.700', '0.850']
     assert page.tiles['distance before the seal slides'] == '0.042 mm'
 
 
