@@ -3,7 +3,8 @@
 The same case gives the same numbers, however many processes compute it.
 """
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
 from functools import partial
@@ -11,7 +12,11 @@ from pathlib import Path
 from statistics import fmean
 from typing import Any, NamedTuple, TypeVar
 
+import numpy as np
+
+from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.errors import NotConvergedError
+from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.presliding import presliding_of_map
 from seal_friction_ros.core.lubrication.friction_map import (
@@ -33,11 +38,13 @@ from seal_friction_ros.core.oring_contact.oring_case_file import OringCaseFile, 
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty
 from seal_friction_ros.offline.work.executor import Workers
-from seal_friction_ros.offline.work.finished_parts import Part, part_key, run_parts
+from seal_friction_ros.offline.work.finished_parts import Kept, Part, part_key, run_parts, try_parts
 from seal_friction_ros.offline.work.seal_writer import rounded
 
 Parsed = TypeVar('Parsed')
-_FEWEST_CELLS = 32  # that a case may have
+_FEWEST_CELLS, _FEWEST_LINES = 32, 9  # that a case may have, and a ring
+MOST_MESH_ERROR = 0.05  # [-] of a friction on the next mesh: more is said to be not converged
+MARKED_MESH_ERROR = 0.03  # [-] more has a mark on the page
 LEAST_ASYMMETRY = 0.01  # [-] that a seal file has: less is an error of the mesh (our choice)
 STICTION_OF_A_RING = 0.13
 """[-] breakaway over sliding friction, less 1, of a map without speeds: mean of the thesis (our choice)"""
@@ -91,6 +98,9 @@ class MapRuns(NamedTuple):
     law: FrictionMap
     rows: list[SteadyFriction]
     retried_steps: int  # steps that did not converge and were repeated in halves
+    mesh_error: FloatArray | None = None
+    """[-] change of each friction on the next finer mesh, on the next coarser one where that fails, NaN where both do,
+    shape (pressures, speeds); None: not computed"""
     uncertainty: Uncertainty | None = None  # None: no samples
 
     @property
@@ -115,6 +125,31 @@ class MapRuns(NamedTuple):
             )
         return ''
 
+    @property
+    def mesh(self) -> str:
+        """What the mesh changes, as a sentence; empty if that is not known."""
+        if self.mesh_error is None:
+            return ''
+        worst = np.nan_to_num(self.mesh_error, nan=np.inf)
+        i, j = np.unravel_index(int(worst.argmax()), worst.shape)
+        where = f'at {1e3 * self.law.speeds[j]:.3g} mm/s and {self.law.pressures[i] / BAR:.3g} bar'
+        if math.isinf(worst[i, j]):
+            return f'Mesh: neither the finer nor the coarser one can be computed {where}: this number has no error.'
+        warning = '; above 5 % a number is not converged' if worst[i, j] > MOST_MESH_ERROR else ''
+        share = self.mesh_error_at_reference
+        return (
+            f'Mesh: the next one changes the friction by {100.0 * worst[i, j]:.2g} % at most, {where}, and by '
+            f'{100.0 * share:.2g} % at most at {1e3 * self.law.reference_speed:g} mm/s{warning}.'
+        )
+
+    @property
+    def mesh_error_at_reference(self) -> float:
+        """Largest change of a friction at the reference speed on the next mesh [-]."""
+        if self.mesh_error is None:
+            return 0.0
+        speed, speeds = math.log(self.law.reference_speed), np.log(self.law.speeds)
+        return max(float(np.interp(speed, speeds, row)) for row in self.mesh_error)
+
     def numbers(self) -> dict[str, Any]:
         """Numbers for JSON."""
         return {
@@ -132,6 +167,9 @@ class MapRuns(NamedTuple):
             'gap_over_roughness_at_rest': [row.thinnest for row in self.rows],
             'speeds_in_seal_file': carries_film(self.rows),
             'retried_steps': self.retried_steps,
+            'mesh_error': None
+            if self.mesh_error is None
+            else [[None if math.isnan(value) else value for value in row] for row in self.mesh_error.tolist()],
             **({} if self.uncertainty is None else {'uncertainty': self.uncertainty.numbers()}),
         }
 
@@ -140,8 +178,8 @@ class MapRuns(NamedTuple):
         low, high = min(self.law.frictions), max(self.law.frictions)
         size = f'{len(self.law.speeds)} speeds x {len(self.law.pressures)} pressures'
         sampled = '' if self.uncertainty is None else f'\n{self.uncertainty.summary()}'
-        limits = f'\n{self.limits}' if self.limits else ''
-        return f'{self.case.name}: {size}, {low:.3g} to {high:.3g} N{limits}{sampled}'
+        notes = ''.join(f'\n{text}' for text in (self.limits, self.mesh) if text)
+        return f'{self.case.name}: {size}, {low:.3g} to {high:.3g} N{notes}{sampled}'
 
 
 def run_map(case: LubricationCase, workers: Workers, work: Path | None = None) -> MapRuns:
@@ -161,7 +199,37 @@ def run_map(case: LubricationCase, workers: Workers, work: Path | None = None) -
     *found, kept_memory = run_parts(f'{case.name}: map', parts, workers, work, partial(compile_for_map, known))
     rows, memory = [SteadyFriction(**row) for row in found], MemoryLength(**kept_memory)
     retried = memory.retried_steps + sum(row.retried_steps for row in rows)
-    return MapRuns(case, friction_map(case, rows, memory.length), rows, retried)
+    law = friction_map(case, rows, memory.length)
+    return MapRuns(case, law, rows, retried, mesh_error(known, rows, workers, work))
+
+
+def other_mesh(case: LubricationCase, factor: float) -> LubricationCase:
+    """The case with ``factor`` times as many elements of the ring along the wall, or cells of another seal."""
+    if case.oring is None:
+        cells = max(round(factor * case.numerics.cells), _FEWEST_CELLS)
+        return replace(case, numerics=replace(case.numerics, cells=cells))
+    ring = case.oring
+    lines = max(round(factor * (ring.numerics.lines - 1)) + 1, _FEWEST_LINES)
+    return replace(case, oring=replace(ring, numerics=replace(ring.numerics, lines=lines)))
+
+
+def mesh_error(
+    case: LubricationCase, rows: Sequence[SteadyFriction], workers: Workers, work: Path | None = None
+) -> FloatArray:
+    """Change of each friction of ``rows`` on the next mesh, as of `MapRuns.mesh_error`; else as of `run_map`."""
+    levels = [row_parts(other_mesh(case, factor)) for factor in (0.5, 2.0)]
+    label, prepare = f'{case.name}: coarser and finer mesh', partial(compile_for_map, case)
+    outcomes = try_parts(label, [part for level in levels for part in level], workers, Kept(work), prepare)
+    errors = np.array(
+        [
+            np.full(len(row.friction), np.nan)
+            if outcome.error
+            else np.abs(np.asarray((outcome.result or {})['friction']) / row.friction - 1.0)
+            for outcome, row in zip(outcomes, [*rows, *rows], strict=True)
+        ]
+    )
+    coarser, finer = errors[: len(rows)], errors[len(rows) :]
+    return np.where(np.isnan(finer), coarser, finer)
 
 
 def row_parts(case: LubricationCase) -> list[Part]:
@@ -191,7 +259,7 @@ def seal_document(computed: MapRuns, name: str) -> dict[str, Any]:
     document: dict[str, Any] = {
         'name': name,
         'source': f'computed by seal_friction ehl map from the case {case.name}; '
-        f'steady sliding, mean of both directions. {computed.limits}'.strip(),
+        f'steady sliding, mean of both directions. {computed.limits} {computed.mesh}'.strip(),
         'coulomb_law': 'friction_map',
         'friction_map': {
             'speeds': [rounded(value, 13) for value in law.speeds],  # their ratios have to be equal

@@ -1,6 +1,6 @@
 """Friction against speed and pressure as a table that the live estimate can afford.
 
-The table is the steady sliding friction. Two lengths describe its lag; neither acts live: over ``memory_length`` of
+The table is the steady sliding friction. Two lengths, which act live as `presliding_of_map`: over ``memory_length`` of
 sliding the film follows a change of speed, F' = (F_steady - F) / memory_length; over ``presliding_length`` the rod
 moves before the seal slides.
 """
