@@ -22,6 +22,7 @@ from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGai
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.mounting import Mounting
 from seal_friction_ros.core.friction.presliding import Presliding
+from seal_friction_ros.core.friction.pressure_asymmetry import PressureAsymmetry
 from seal_friction_ros.core.identification.signal_preparation import SavitzkyGolay, Sliding
 from seal_friction_ros.core.lubrication.grease import Grease
 from seal_friction_ros.core.lubrication.lubrication_case import MapGrid
@@ -68,6 +69,7 @@ RECORDS = (
     Mounting,
     ForceSumCorrection,
     TemperatureScale,
+    PressureAsymmetry,
     Uncertainty,
     Groove,
     Rubber,

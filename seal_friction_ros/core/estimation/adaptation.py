@@ -405,7 +405,8 @@ def friction_of_sliding(
     Returns:
         Friction of the estimate; friction by the filter with the sign of the velocity, without bounds [N].
     """
-    coulomb, file_std, stiction, in_identified_range, added = friction
+    coulomb, file_std, added = friction.coulomb_friction, friction.coulomb_friction_std, friction.velocity_friction
+    stiction, asymmetry, is_in_range = friction.stiction, friction.breakaway_asymmetry, friction.in_identified_range
     law, known, terms, is_proven = coulomb + added, state.filter, state.filter.terms, state.outlook.is_proven
     lowest, highest = settings.scale_min, settings.scale_max
     direction, speed = (1.0, velocity) if velocity > 0.0 else (-1.0, -velocity)
@@ -416,13 +417,14 @@ def friction_of_sliding(
     std = _std_of_sliding(known, speed, law, file_std)
     if uses and is_proven:
         at_no_speed = between(lowest * coulomb, slope * coulomb + terms.coulomb, highest * coulomb)
-        if law > 0.0:
-            stiction *= sliding / law
-        adapted = ActuatorFriction(at_no_speed, std, stiction, in_identified_range, sliding - at_no_speed)
+        scale = sliding / law if law > 0.0 else 1.0
+        adapted = ActuatorFriction(
+            at_no_speed, std, stiction * scale, is_in_range, sliding - at_no_speed, asymmetry * scale
+        )
         return adapted, direction * found, law > 0.0 and sliding != found
     missed, doubt = found - law, file_std * file_std + known.friction_std * known.friction_std
     wider = (abs(sliding - law) + ONE_SIDED_95 * std) / BAND_95
-    adapted = ActuatorFriction(coulomb, std if std > wider else wider, stiction, in_identified_range, added)
+    adapted = ActuatorFriction(coulomb, std if std > wider else wider, stiction, is_in_range, added, asymmetry)
     return adapted, direction * found, is_proven and law > 0.0 and missed * missed > 4.0 * doubt
 
 
@@ -449,7 +451,8 @@ def friction_at_rest(
         force_sum: [N]
         uses: Whether the estimate uses what is learnt.
     """
-    coulomb, file_std, stiction, in_identified_range, added = friction
+    coulomb, file_std, added = friction.coulomb_friction, friction.coulomb_friction_std, friction.velocity_friction
+    stiction, asymmetry, is_in_range = friction.stiction, friction.breakaway_asymmetry, friction.in_identified_range
     law, outlook, known = coulomb + added, state.outlook, state.filter
     found = friction_magnitude(known.terms, 0.0, 0.0, law)
     sliding = between(settings.scale_min * law, found, settings.scale_max * law)
@@ -459,11 +462,13 @@ def friction_at_rest(
     is_pressed, can_contradict = state.rest.pressed > LONGEST_PRESS, outlook.is_proven and law > 0.0
     if uses and outlook.is_proven:
         at_no_speed = bounded_friction(settings, known, 0.0, 0.0, coulomb)
-        adapted = ActuatorFriction(at_no_speed, std, stiction * scale, in_identified_range, sliding - at_no_speed)
+        adapted = ActuatorFriction(
+            at_no_speed, std, stiction * scale, is_in_range, sliding - at_no_speed, asymmetry * scale
+        )
         return adapted, is_pressed or (can_contradict and sliding != found)
     missed, doubt = found - law, file_std * file_std + known.friction_std * known.friction_std
     wider = (abs(outlook.offset) + ONE_SIDED_95 * std) / BAND_95
-    adapted = ActuatorFriction(coulomb, std if std > wider else wider, stiction, in_identified_range, added)
+    adapted = ActuatorFriction(coulomb, std if std > wider else wider, stiction, is_in_range, added, asymmetry)
     contradicts = abs(outlook.offset) > 0.5 * (coulomb + stiction) or missed * missed > 4.0 * doubt
     return adapted, is_pressed or (can_contradict and contradicts)
 

@@ -50,6 +50,7 @@ from seal_friction_ros.core.friction.actuator import (
     SealNumbers,
     at_temperature,
     at_unknown_temperature,
+    breakaway_in,
     friction_of_seals,
     numbers_of_seals,
 )
@@ -333,7 +334,7 @@ _NO_AGE = BITS.PRESSURE_MISSING | BITS.FORCE_MISSING
 _NO_STATE = NO_VELOCITY | BITS.INPUT_REFUSED | BITS.PRESSURE_MISSING
 _NO_FORCE_SUM = BITS.FORCE_MISSING | BITS.FORCE_STALE | BITS.FORCE_CONTAINS_LOAD
 _NO_READING = _NO_STATE | _NO_FORCE_SUM
-_NO_FRICTION = ActuatorFriction(0.0, 0.0, 0.0, True, 0.0)
+_NO_FRICTION = ActuatorFriction(0.0, 0.0, 0.0, True, 0.0, 0.0)
 _UNKNOWN = StateFriction(UNKNOWN, 0, 0.0)
 
 CREEP = 0.1  # [-] our choice: a rod in the band of rest is known to be at rest up to this share of stick_velocity
@@ -675,7 +676,8 @@ def estimate_of(
     ``scale``, ``scale_std``, ``offset`` and ``residual`` [N] are what adaptation adds to the estimate.
     """
     velocity, status, coulomb = seen.velocity, seen.status, friction.coulomb_friction
-    breakaway = coulomb + friction.stiction if parameters.settings.use_stiction else coulomb
+    ahead = sign(velocity if velocity != 0.0 else seen.force_sum)
+    breakaway = breakaway_in(friction, ahead, with_stiction=parameters.settings.use_stiction)
     if not friction.in_identified_range:
         status |= BITS.OUTSIDE_IDENTIFIED_RANGE
     if parameters.limits_motion:

@@ -16,8 +16,9 @@ from seal_friction_ros.core.friction.laws.velocity_terms import (
     VelocityTerms,
     with_velocity_terms,
 )
-from seal_friction_ros.core.friction.mounting import CHAMBERS, CHAMBERS_TEXT, pressure_at_seal
+from seal_friction_ros.core.friction.mounting import CHAMBERS, CHAMBERS_TEXT, pressed_out, pressure_at_seal
 from seal_friction_ros.core.friction.presliding import Presliding
+from seal_friction_ros.core.friction.pressure_asymmetry import PressureAsymmetry
 from seal_friction_ros.core.friction.temperature import (
     TemperatureScale,
     one_temperature_scale,
@@ -68,6 +69,7 @@ class Seal(CheckedParameters):
         description='Factor on all friction, as `seal_friction adapt` writes it.',
     )
     velocity_terms: VelocityTerms | None = None
+    pressure_asymmetry: PressureAsymmetry | None = None  # None: the same both ways, or not known
     pressure_min: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e9, description='Lowest pressure identified.')
     pressure_max: float = parameter(unit='Pa', lower=1.0, upper=1e9, description='Highest pressure identified.')
     identified_motion: IdentifiedMotion = ANY_MOTION
@@ -90,7 +92,8 @@ class Seal(CheckedParameters):
     @property
     def depends_on_velocity(self) -> bool:
         """Whether its sliding friction differs from its Coulomb friction."""
-        return self.coulomb_law.depends_on_speed or self.velocity_terms is not None
+        terms = self.velocity_terms is not None or self.pressure_asymmetry is not None
+        return self.coulomb_law.depends_on_speed or terms
 
     def _check_monotone(self) -> None:
         # 200 intervals over twice the identified range: a table of points can hide a fall between two of them.
@@ -122,6 +125,8 @@ class SealNumbers(NamedTuple):
     in 1 of 1000 cases"""
     pressure_low: float = -math.inf  # [Pa] ends of the identified range with its margin
     pressure_high: float = math.inf  # [Pa]
+    asymmetry: float = 0.0  # [-] of `PressureAsymmetry`
+    full_pressure: float = 1.0  # [Pa] likewise
 
 
 def numbers_of_law(law: FrictionLaw, terms: VelocityTerms | None = None) -> SealNumbers:
@@ -167,6 +172,9 @@ class MountedSeal:
             pressure_low=seal.pressure_min - margin,
             pressure_high=seal.pressure_max + margin,
         )
+        if seal.pressure_asymmetry is not None:
+            asymmetry, full = seal.pressure_asymmetry.asymmetry, seal.pressure_asymmetry.full_pressure
+            numbers = numbers._replace(depends_on_velocity=True, asymmetry=asymmetry, full_pressure=full)
         object.__setattr__(self, 'numbers', numbers)  # frozen: the only way to keep what was built from the fields
 
 
@@ -178,6 +186,7 @@ class ActuatorFriction(NamedTuple):
     stiction: float  # [N]
     in_identified_range: bool
     velocity_friction: float  # [N] what sliding at the velocity adds to the magnitude; 0 at rest
+    breakaway_asymmetry: float = 0.0  # [N] by which breakaway on extension is larger than its mean of both directions
 
 
 @compilable
@@ -200,22 +209,40 @@ def sliding_friction(
 
 
 @compilable
+def share_of_extension(seal: SealNumbers, pressure_a: float, pressure_b: float, pressing: float) -> float:
+    """Share by which the friction of a seal is larger on extension than the mean of both directions [-].
+
+    ``pressing`` [Pa, >= 0] is the pressure of the seal; else as of `friction_of_seals`.
+    """
+    loaded = pressing / seal.full_pressure if pressing < seal.full_pressure else 1.0
+    return -pressed_out(seal.chamber, pressure_a, pressure_b) * seal.asymmetry * loaded
+
+
+@compilable
 def friction_of_seal(
     seal: SealNumbers, pressure_a: float, pressure_b: float, velocity: float
-) -> tuple[float, float, float, bool, float]:
+) -> tuple[float, float, float, bool, float, float]:
     """The numbers of `ActuatorFriction` for one seal; arguments as for `friction_of_seals`."""
     # One unpacking takes a quarter of the time of an attribute each.
-    law, coulomb_speed, _, _, depends, chamber, scale, stiction, ratio, relative_std, variance, square, low, high = seal
+    (
+        law, coulomb_speed, _, _, depends, chamber, scale, stiction, ratio, relative_std, variance, square, low, high,
+        asymmetry, _,
+    ) = seal  # fmt: skip
     pressure = pressure_at_seal(chamber, pressure_a, pressure_b)
     pressing = 0.0 if pressure < 0.0 else pressure
     by_law = evaluate(law, pressing, coulomb_speed)
     coulomb = by_law * scale
-    added = 0.0
-    if depends and velocity != 0.0:
-        direction = 1 if velocity > 0.0 else -1
-        added = sliding_friction(seal, by_law, pressing, abs(velocity), direction) * scale - coulomb
+    added = share = 0.0
+    if depends:
+        if asymmetry != 0.0:
+            share = share_of_extension(seal, pressure_a, pressure_b, pressing)
+        if velocity != 0.0:
+            direction = 1 if velocity > 0.0 else -1
+            sliding = sliding_friction(seal, by_law, pressing, abs(velocity), direction) * scale
+            added = sliding * (1.0 + direction * share) - coulomb
+    more = stiction * scale + ratio * coulomb
     std = math.sqrt(math.pow(relative_std * (coulomb + added), square) + variance)
-    return coulomb, std, stiction * scale + ratio * coulomb, low <= pressure <= high, added
+    return coulomb, std, more, low <= pressure <= high, added, share * (coulomb + more)
 
 
 @compilable
@@ -241,14 +268,26 @@ def friction_of_seals(
     stiction = 0.0
     inside = True
     added = 0.0
+    asymmetry = 0.0
     for seal in unrolled(seals):  # a longer body the compiler does not unroll
-        one, its_std, its_stiction, is_inside, more = friction_of_seal(seal, pressure_a, pressure_b, velocity)
+        one, its_std, its_stiction, is_inside, more, uneven = friction_of_seal(seal, pressure_a, pressure_b, velocity)
         coulomb += one
         std += its_std
         stiction += its_stiction
         inside = inside and is_inside
         added += more
-    return ActuatorFriction(coulomb, std, stiction, inside, added)
+        asymmetry += uneven
+    return ActuatorFriction(coulomb, std, stiction, inside, added, asymmetry)
+
+
+@compilable
+def breakaway_in(friction: ActuatorFriction, direction: int, with_stiction: bool) -> float:
+    """Force at which a rod leaves rest in a ``direction`` of -1 or 1 [N], or without stiction; 0: mean of both."""
+    mean = friction.coulomb_friction + friction.stiction
+    force = mean if with_stiction else friction.coulomb_friction
+    if friction.breakaway_asymmetry != 0.0:
+        force *= 1.0 + direction * friction.breakaway_asymmetry / mean
+    return force
 
 
 @compilable
@@ -266,6 +305,8 @@ def sliding_friction_of_seals(
         friction = evaluate(seal.law, pressing, seal.coulomb_speed)
         if seal.depends_on_velocity:
             friction = sliding_friction(seal, friction, pressing, speed, direction)
+            if seal.asymmetry != 0.0:
+                friction *= 1.0 + direction * share_of_extension(seal, pressure_a, pressure_b, pressing)
         total += friction * seal.scale
     return total
 
@@ -282,20 +323,22 @@ def at_temperature(friction: ActuatorFriction, law: TemperatureScale, temperatur
         law: Of the seals.
         temperature: [K] finite.
     """
-    coulomb, std, stiction, in_identified_range, velocity_friction = friction
+    coulomb, std, stiction, in_identified_range, velocity_friction, asymmetry = friction
     scale = scale_at(law, temperature)
     unsure = (coulomb + velocity_friction) * law.coefficient_std * (temperature - law.reference)
     std = scale * math.sqrt(std * std + unsure * unsure)
-    return ActuatorFriction(scale * coulomb, std, scale * stiction, in_identified_range, scale * velocity_friction)
+    return ActuatorFriction(
+        scale * coulomb, std, scale * stiction, in_identified_range, scale * velocity_friction, scale * asymmetry
+    )
 
 
 @compilable
 def at_unknown_temperature(friction: ActuatorFriction, law: TemperatureScale) -> ActuatorFriction:
     """The same friction, with the spread of the scale over the identified temperatures in its standard deviation."""
-    coulomb, std, stiction, in_identified_range, velocity_friction = friction
+    coulomb, std, stiction, in_identified_range, velocity_friction, asymmetry = friction
     unsure = (coulomb + velocity_friction) * std_of_unknown(law)
     std = math.sqrt(std * std + unsure * unsure)
-    return ActuatorFriction(coulomb, std, stiction, in_identified_range, velocity_friction)
+    return ActuatorFriction(coulomb, std, stiction, in_identified_range, velocity_friction, asymmetry)
 
 
 def numbers_of_seals(seals: tuple[MountedSeal, ...]) -> tuple[SealNumbers, ...]:

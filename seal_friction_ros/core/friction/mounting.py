@@ -67,6 +67,22 @@ def pressure_at_seal(chamber: int, pressure_a: Any, pressure_b: Any) -> Any:
     return 0.0
 
 
+@compilable
+def pressed_out(chamber: int, pressure_a: float, pressure_b: float) -> float:
+    """1 where the pressure of a seal drives the rod out, -1 where it drives it in, 0 where there is none.
+
+    A seal moves towards its pressure where the rod moves against it: its piston, or out of its rod chamber the rod.
+    Arguments as of `pressure_at_seal`.
+    """
+    if chamber == _A:
+        return 1.0
+    if chamber == _B:
+        return -1.0
+    if chamber != _DIFFERENCE or pressure_a == pressure_b:
+        return 0.0
+    return 1.0 if pressure_a > pressure_b else -1.0
+
+
 def pressures_at_seals(chambers: Sequence[str], pressure_a: FloatArray, pressure_b: FloatArray) -> FloatArray:
     """Pressure that each seal sees [Pa, gauge], shape (n, number of seals).
 

@@ -12,9 +12,9 @@ A seal file looks like this; every law and every field is in docs/seal_files.md:
     uncertainty: {relative_std: 0.08, absolute_std: 0.3}
     identified_pressure: [0.0, 6.9e+6]
 
-Optional are ``velocity_terms``, ``presliding``, ``stiction_ratio``, ``friction_scale``, ``identified_speed``,
-``identified_directions``, ``mounting``, ``force_sum_correction``, ``temperature``, and ``identification``: what
-``seal_friction identify`` reports about its data. This module ignores the latter.
+Optional are ``velocity_terms``, ``pressure_asymmetry``, ``presliding``, ``stiction_ratio``, ``friction_scale``,
+``identified_speed``, ``identified_directions``, ``mounting``, ``force_sum_correction``, ``temperature``, and
+``identification``: what ``seal_friction identify`` reports about its data. This module ignores the latter.
 """
 
 import dataclasses
@@ -40,12 +40,13 @@ from seal_friction_ros.core.friction.laws.normal_force import NORMAL_FORCE_LAWS,
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.mounting import Mounting
 from seal_friction_ros.core.friction.presliding import Presliding
+from seal_friction_ros.core.friction.pressure_asymmetry import PressureAsymmetry
 from seal_friction_ros.core.friction.temperature import TemperatureScale
 
 _COMMON = {
     'name', 'source', 'geometry', 'coulomb_law', 'stiction', 'stiction_ratio', 'velocity_terms', 'uncertainty',
     'identified_pressure', 'identified_speed', 'identified_directions', 'identification', 'mounting',
-    'force_sum_correction', 'friction_scale', 'presliding', 'temperature',
+    'force_sum_correction', 'friction_scale', 'presliding', 'temperature', 'pressure_asymmetry',
 }  # fmt: skip
 _PARTS: dict[type, str] = {
     SealGeometry: 'geometry',
@@ -57,6 +58,16 @@ _LAWS_OF_PART: dict[type, Mapping[str, type[Law]]] = {
     NormalForceLaw: NORMAL_FORCE_LAWS,
     FrictionCoefficientLaw: FRICTION_COEFFICIENT_LAWS,
 }
+
+
+_OPTIONAL: dict[str, type] = {
+    'velocity_terms': VelocityTerms,
+    'pressure_asymmetry': PressureAsymmetry,
+    'presliding': Presliding,
+    'force_sum_correction': ForceSumCorrection,
+    'temperature': TemperatureScale,
+}
+"""Part of a seal that a file may have -> its record"""
 
 
 def friction_laws() -> dict[str, type[FrictionLaw]]:
@@ -75,19 +86,10 @@ def parse_seal(document: Any) -> Seal:
     law_type = friction_laws()[_choice(document, 'coulomb_law', friction_laws(), where)]
     check_names(document, sorted(_COMMON | keys_of_law(law_type)), f'{where}: {law_type.NAME}')
     law = _friction_law(law_type, document, where)
-    terms = None
-    if 'velocity_terms' in document:
-        terms = from_mapping(VelocityTerms, document['velocity_terms'], f'{where}: velocity_terms')
-    presliding = None
-    if 'presliding' in document:
-        presliding = from_mapping(Presliding, document['presliding'], f'{where}: presliding')
-    correction = None
-    if 'force_sum_correction' in document:
-        given = document['force_sum_correction']
-        correction = from_mapping(ForceSumCorrection, given, f'{where}: force_sum_correction')
-    temperature = None
-    if 'temperature' in document:
-        temperature = from_mapping(TemperatureScale, document['temperature'], f'{where}: temperature')
+    optional = {
+        key: from_mapping(record, document[key], f'{where}: {key}') if key in document else None
+        for key, record in _OPTIONAL.items()
+    }
     about = document.get('identification', {})
     if not isinstance(about, Mapping) or not _can_be_recorded(about):
         raise ValueError(f'{where}: identification is not a mapping of texts, finite numbers, and lists of them')
@@ -105,11 +107,8 @@ def parse_seal(document: Any) -> Seal:
         'name': name,
         'coulomb_law': law,
         'uncertainty': uncertainty,
-        'velocity_terms': terms,
-        'presliding': presliding,
         'identified_motion': from_mapping(IdentifiedMotion, motion, f'{where}: identified'),
-        'force_sum_correction': correction,
-        'temperature': temperature,
+        **optional,
     }
     return from_mapping(Seal, numbers, where, **made)
 

@@ -1,5 +1,6 @@
 """The friction map of a case: steady friction over speed and pressure, and its memory length."""
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -20,11 +21,20 @@ from seal_friction_ros.core.lubrication.model import (
     solid_limit,
 )
 from seal_friction_ros.core.lubrication.oring_film import oring_film
+from seal_friction_ros.core.lubrication.shear import real_area_share
 
 _PASSAGES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0, 100.0, math.inf)  # steps to the steady film
 _MOST_RETRIES = 20
 _MEMORY_STEPS = 200
 _LONG_PASSAGES = 250.0  # a step of so many is nearly one to the steady film
+DISCRETISATION = 0.03
+"""[-] of the friction: what counts as an error of mesh and grid (our choice)"""
+PERCOLATION = 0.42
+"""[-] real contact above which the contact leaves the lubricant no way through.
+
+Source: W. B. Dapp, A. Lücke, B. N. J. Persson, M. H. Müser 2012: the flow ends where the contact percolates."""
+THINNEST_OF_CLOSURES = 0.5
+"""[-] gap over rms roughness from which the flow factors of Patir and Cheng hold"""
 
 
 class SteadyFriction(NamedTuple):
@@ -36,6 +46,8 @@ class SteadyFriction(NamedTuple):
     direction_difference: FloatArray  # [N] friction towards the pressure less that away from it
     stiffness: float  # [N/m] of seal and groove against axial motion of the contact
     retried_steps: int
+    real_contact: float = 0.0  # [-] largest share of the seal that touches, at rest
+    thinnest: float = math.inf  # [-] smallest gap over the rms roughness, at rest
 
 
 class MemoryLength(NamedTuple):
@@ -129,6 +141,8 @@ def steady_friction(case: LubricationCase, pressure: float) -> SteadyFriction:
         NotConvergedError: A film did not converge; the message says at which speed and pressure.
     """
     model, begin, stiffness = _at_rest(case, pressure)
+    real_contact = float(real_area_share(model.contact, begin.gap).max())
+    thinnest = float(begin.gap.min()) / case.topography.rms_height
     speeds = map_speeds(case.map)
     values = np.empty((2, 2, len(speeds)))
     retried = 0
@@ -142,7 +156,9 @@ def steady_friction(case: LubricationCase, pressure: float) -> SteadyFriction:
             retried += more
             values[k, :, i] = _friction(model, state, direction * float(speed))
     friction, solid = values.mean(axis=0)
-    return SteadyFriction(pressure, friction, solid, values[1, 0] - values[0, 0], stiffness, retried)
+    return SteadyFriction(
+        pressure, friction, solid, values[1, 0] - values[0, 0], stiffness, retried, real_contact, thinnest
+    )
 
 
 def memory_length(case: LubricationCase) -> MemoryLength:
@@ -188,3 +204,55 @@ def friction_map(case: LubricationCase, rows: list[SteadyFriction], memory: floa
         memory_length=memory,
         presliding_length=float(held.friction[0]) / float(held.stiffness),
     )
+
+
+def carries_film(rows: Sequence[SteadyFriction]) -> bool:
+    """Whether lubricant gets under the seal at every pressure: no real contact at rest is above `PERCOLATION`."""
+    return max(row.real_contact for row in rows) <= PERCOLATION
+
+
+def live_map(law: FrictionMap, rows: Sequence[SteadyFriction]) -> FrictionMap:
+    """The map that a seal file has: without the speeds where the contact carries no film.
+
+    There the film that the model computes has no way in, and the change with speed that follows from it is refuted:
+    docs/ehl.md. The friction is that at the reference speed, with no length over which it follows a change of speed.
+    Where the friction at the reference speed falls from one pressure to the next by less than `DISCRETISATION`, the
+    row is raised to the one before: rubber under more pressure does not rub less.
+    """
+    if carries_film(rows):
+        return dataclasses.replace(law, frictions=_levelled(law))
+    at_reference = tuple(law.coulomb_friction(pressure) for pressure in law.pressures)
+    law = dataclasses.replace(
+        law,
+        speeds=(law.reference_speed,),
+        frictions=at_reference,
+        memory_length=0.0,
+        presliding_length=law.presliding_length * at_reference[0] / law.frictions[0],
+    )
+    return dataclasses.replace(law, frictions=_levelled(law))
+
+
+def pressure_asymmetry(law: FrictionMap, rows: Sequence[SteadyFriction]) -> float:
+    """Share by which the friction is larger towards the highest pressure than the mean [-], and smaller away from it.
+
+    Half the difference of the directions over their sum at the reference speed grows with the pressure; the share is
+    that at the highest pressure of the line through 0 that fits it best (least squares).
+    """
+    loaded = np.array([row.pressure for row in rows]) / law.pressures[-1]
+    shares = [directions(row, law.reference_speed, law.speeds) for row in rows]
+    uneven = np.array([0.5 * (towards - away) / (0.5 * (towards + away)) for towards, away in shares])
+    return float(uneven @ loaded / (loaded @ loaded))
+
+
+def directions(row: SteadyFriction, speed: float, speeds: Sequence[float]) -> tuple[float, float]:
+    """Friction [N] towards the pressure and away from it at a ``speed`` [m/s], ``speeds`` being those of the row."""
+    mean, difference = (np.interp(math.log(speed), np.log(speeds), v) for v in (row.friction, row.direction_difference))
+    return float(mean + 0.5 * difference), float(mean - 0.5 * difference)
+
+
+def _levelled(law: FrictionMap) -> tuple[float, ...]:
+    table = np.reshape(law.frictions, (len(law.pressures), -1))
+    at_reference = np.array([law.coulomb_friction(pressure) for pressure in law.pressures])
+    raised = np.maximum.accumulate(at_reference) / at_reference
+    raised[raised > 1.0 + DISCRETISATION] = 1.0
+    return tuple((table * raised[:, None]).ravel().tolist())

@@ -157,9 +157,11 @@ def _stage(c: Constants, elastic: Any, state: SealShear, y: Any, start: float, e
     a, b = chamber_pressures(c, y)
     velocity = y[1]
     at_rest = friction_of_seals(c.seals, a, b, 0.0)
-    sliding = sliding_friction_of_seals(c.seals, a, b, abs(velocity), 1 if velocity > 0.0 else -1)
+    ahead = 1 if velocity > 0.0 else -1
+    sliding = sliding_friction_of_seals(c.seals, a, b, abs(velocity), ahead)
     coulomb = at_rest.coulomb_friction
-    return sheared(elastic, state, Slide(y[0] - start, elapsed, coulomb, sliding - coulomb, at_rest.stiction), velocity)
+    stiction = at_rest.stiction + ahead * at_rest.breakaway_asymmetry
+    return sheared(elastic, state, Slide(y[0] - start, elapsed, coulomb, sliding - coulomb, stiction), velocity)
 
 
 def for_elastic_step(elastic: ElasticSeals | None, c: Constants) -> Any:

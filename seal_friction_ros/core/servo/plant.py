@@ -26,6 +26,7 @@ from seal_friction_ros.core.foundation.parameters import CheckedParameters, para
 from seal_friction_ros.core.friction.actuator import (
     NO_SEALS,
     MountedSeal,
+    breakaway_in,
     friction_of_seals,
     numbers_of_seals,
     sliding_friction_of_seals,
@@ -219,8 +220,9 @@ def margin(c: Constants, y: Integrated, direction: int, load_force: float) -> fl
         force = force_sum(c, y, load_force)
         pressure_a, pressure_b = chamber_pressures(c, y)
         at_rest = friction_of_seals(c.seals, pressure_a, pressure_b, 0.0)
-        slowest = sliding_friction_of_seals(c.seals, pressure_a, pressure_b, 0.0, 1 if force > 0.0 else -1)
-        return max(at_rest.coulomb_friction + at_rest.stiction, slowest) - abs(force)
+        ahead = 1 if force > 0.0 else -1
+        slowest = sliding_friction_of_seals(c.seals, pressure_a, pressure_b, 0.0, ahead)
+        return max(breakaway_in(at_rest, ahead, with_stiction=True), slowest) - abs(force)
     return min(y[1] * direction, c.cylinder.limit - y[0] * direction)
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.compiled import compiled, keep
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
-from seal_friction_ros.core.friction.actuator import MountedSeal, friction_of_seals
-from seal_friction_ros.core.friction.states import StateFriction, state_friction
+from seal_friction_ros.core.friction.actuator import MountedSeal, breakaway_in, friction_of_seals
+from seal_friction_ros.core.friction.states import StateFriction, sign, state_friction
 from seal_friction_ros.core.servo.controller import (
     Command,
     ControllerState,
@@ -199,7 +199,9 @@ def _outputs(kept: Any, plant: PlantState, shear: SealShear, command: Command, l
     force = force_sum(c, plant[:10], load_force)
     seals = friction_of_seals(c.seals, a, b, plant.velocity)
     coulomb = seals.coulomb_friction
-    sliding, breakaway = coulomb + seals.velocity_friction, coulomb + seals.stiction
+    sliding = coulomb + seals.velocity_friction
+    ahead = sign(plant.velocity if plant.velocity != 0.0 else force)
+    breakaway = breakaway_in(seals, ahead, with_stiction=True)
     acting = state_friction(plant.velocity, force, plant.velocity == 0.0, sliding, breakaway)
     acting = _with_elastic_seals(elastic, shear, acting)
     measured = (plant.position, plant.velocity, a, b, plant.spool, force)

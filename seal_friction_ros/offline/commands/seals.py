@@ -19,7 +19,10 @@ def add_parser(commands: Any) -> None:
     text, example = 'write a page with the curves of a seal file', 'charts ms28775_114 --out ms28775_114.html'
     charts = cli.add_command(commands, 'charts', run_charts, text, example)
     text = 'friction and breakaway of a seal file, or of an O-ring from its geometry'
-    examples = 'force ms28775_114 --pressure 35bar 69bar --seals 2', 'force ./my_ring.yaml --pressure 3.5e6 --speed 10mm/s'
+    examples = (
+        'force ms28775_114 --pressure 35bar 69bar --seals 2',
+        'force ./my_ring.yaml --pressure 3.5e6 --speed 10mm/s',
+    )
     force = cli.add_command(commands, 'force', run_force, text, *examples)
     cli.add_file(force, 'seal', 'seals', 'seal file, or case of an O-ring', metavar='SEAL')
     cli.add_options(force, _OF_FORCE)

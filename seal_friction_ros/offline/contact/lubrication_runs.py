@@ -3,7 +3,8 @@
 The same case gives the same numbers, however many processes compute it.
 """
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
 from functools import partial
@@ -11,15 +12,25 @@ from pathlib import Path
 from statistics import fmean
 from typing import Any, NamedTuple, TypeVar
 
+import numpy as np
+
+from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.errors import NotConvergedError
+from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.presliding import presliding_of_map
 from seal_friction_ros.core.lubrication.friction_map import (
+    PERCOLATION,
+    THINNEST_OF_CLOSURES,
     MemoryLength,
     SteadyFriction,
+    carries_film,
+    directions,
     friction_map,
+    live_map,
     map_pressures,
     memory_length,
+    pressure_asymmetry,
     steady_friction,
 )
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, parse_lubrication_case, varied_case
@@ -27,11 +38,16 @@ from seal_friction_ros.core.oring_contact.oring_case_file import OringCaseFile, 
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty
 from seal_friction_ros.offline.work.executor import Workers
-from seal_friction_ros.offline.work.finished_parts import Part, part_key, run_parts
+from seal_friction_ros.offline.work.finished_parts import Kept, Part, part_key, run_parts, try_parts
 from seal_friction_ros.offline.work.seal_writer import rounded
 
 Parsed = TypeVar('Parsed')
-_FEWEST_CELLS = 32  # that a case may have
+_FEWEST_CELLS, _FEWEST_LINES = 32, 9  # that a case may have, and a ring
+MOST_MESH_ERROR = 0.05  # [-] of a friction on the next mesh: more is said to be not converged
+MARKED_MESH_ERROR = 0.03  # [-] more has a mark on the page
+LEAST_ASYMMETRY = 0.01  # [-] that a seal file has: less is an error of the mesh (our choice)
+STICTION_OF_A_RING = 0.13
+"""[-] breakaway over sliding friction, less 1, of a map without speeds: mean of the thesis (our choice)"""
 
 
 def load_case(name: str) -> LubricationCase:
@@ -82,7 +98,57 @@ class MapRuns(NamedTuple):
     law: FrictionMap
     rows: list[SteadyFriction]
     retried_steps: int  # steps that did not converge and were repeated in halves
+    mesh_error: FloatArray | None = None
+    """[-] change of each friction on the next finer mesh, on the next coarser one where that fails, NaN where both do,
+    shape (pressures, speeds); None: not computed"""
     uncertainty: Uncertainty | None = None  # None: no samples
+
+    @property
+    def directions(self) -> list[tuple[float, float]]:
+        """Friction [N] towards the pressure and away from it at the reference speed, at each pressure."""
+        return [directions(row, self.law.reference_speed, self.law.speeds) for row in self.rows]
+
+    @property
+    def limits(self) -> str:
+        """Where the film is out of its range, as a sentence; empty where it is not."""
+        touching, thinnest = max(row.real_contact for row in self.rows), min(row.thinnest for row in self.rows)
+        if not carries_film(self.rows):
+            return (
+                f'At rest {touching:.2g} of the seal touches; above {PERCOLATION:g} no lubricant gets under it. So the '
+                'change with speed is not in the seal file: the friction is that at '
+                f'{1e3 * self.law.reference_speed:g} mm/s at every speed.'
+            )
+        if thinnest < THINNEST_OF_CLOSURES:
+            return (
+                f'At rest the gap is {thinnest:.2g} of the roughness; the flow factors hold from '
+                f'{THINNEST_OF_CLOSURES:g}.'
+            )
+        return ''
+
+    @property
+    def mesh(self) -> str:
+        """What the mesh changes, as a sentence; empty if that is not known."""
+        if self.mesh_error is None:
+            return ''
+        worst = np.nan_to_num(self.mesh_error, nan=np.inf)
+        i, j = np.unravel_index(int(worst.argmax()), worst.shape)
+        where = f'at {1e3 * self.law.speeds[j]:.3g} mm/s and {self.law.pressures[i] / BAR:.3g} bar'
+        if math.isinf(worst[i, j]):
+            return f'Mesh: neither the finer nor the coarser one can be computed {where}: this number has no error.'
+        warning = '; above 5 % a number is not converged' if worst[i, j] > MOST_MESH_ERROR else ''
+        share = self.mesh_error_at_reference
+        return (
+            f'Mesh: the next one changes the friction by {100.0 * worst[i, j]:.2g} % at most, {where}, and by '
+            f'{100.0 * share:.2g} % at most at {1e3 * self.law.reference_speed:g} mm/s{warning}.'
+        )
+
+    @property
+    def mesh_error_at_reference(self) -> float:
+        """Largest change of a friction at the reference speed on the next mesh [-]."""
+        if self.mesh_error is None:
+            return 0.0
+        speed, speeds = math.log(self.law.reference_speed), np.log(self.law.speeds)
+        return max(float(np.interp(speed, speeds, row)) for row in self.mesh_error)
 
     def numbers(self) -> dict[str, Any]:
         """Numbers for JSON."""
@@ -91,10 +157,19 @@ class MapRuns(NamedTuple):
             'speed_m_s': self.law.speeds,
             'pressure_Pa': self.law.pressures,
             'friction_N': [row.friction.tolist() for row in self.rows],
+            'towards_pressure_N': [towards for towards, _ in self.directions],
+            'away_from_pressure_N': [away for _, away in self.directions],
+            'pressure_asymmetry': pressure_asymmetry(self.law, self.rows),
             'solid_share': [(row.solid / row.friction).tolist() for row in self.rows],
             'memory_length_m': self.law.memory_length,
             'presliding_length_m': self.law.presliding_length,
+            'real_contact_at_rest': [row.real_contact for row in self.rows],
+            'gap_over_roughness_at_rest': [row.thinnest for row in self.rows],
+            'speeds_in_seal_file': carries_film(self.rows),
             'retried_steps': self.retried_steps,
+            'mesh_error': None
+            if self.mesh_error is None
+            else [[None if math.isnan(value) else value for value in row] for row in self.mesh_error.tolist()],
             **({} if self.uncertainty is None else {'uncertainty': self.uncertainty.numbers()}),
         }
 
@@ -103,7 +178,8 @@ class MapRuns(NamedTuple):
         low, high = min(self.law.frictions), max(self.law.frictions)
         size = f'{len(self.law.speeds)} speeds x {len(self.law.pressures)} pressures'
         sampled = '' if self.uncertainty is None else f'\n{self.uncertainty.summary()}'
-        return f'{self.case.name}: {size}, {low:.3g} to {high:.3g} N{sampled}'
+        notes = ''.join(f'\n{text}' for text in (self.limits, self.mesh) if text)
+        return f'{self.case.name}: {size}, {low:.3g} to {high:.3g} N{notes}{sampled}'
 
 
 def run_map(case: LubricationCase, workers: Workers, work: Path | None = None) -> MapRuns:
@@ -123,7 +199,37 @@ def run_map(case: LubricationCase, workers: Workers, work: Path | None = None) -
     *found, kept_memory = run_parts(f'{case.name}: map', parts, workers, work, partial(compile_for_map, known))
     rows, memory = [SteadyFriction(**row) for row in found], MemoryLength(**kept_memory)
     retried = memory.retried_steps + sum(row.retried_steps for row in rows)
-    return MapRuns(case, friction_map(case, rows, memory.length), rows, retried)
+    law = friction_map(case, rows, memory.length)
+    return MapRuns(case, law, rows, retried, mesh_error(known, rows, workers, work))
+
+
+def other_mesh(case: LubricationCase, factor: float) -> LubricationCase:
+    """The case with ``factor`` times as many elements of the ring along the wall, or cells of another seal."""
+    if case.oring is None:
+        cells = max(round(factor * case.numerics.cells), _FEWEST_CELLS)
+        return replace(case, numerics=replace(case.numerics, cells=cells))
+    ring = case.oring
+    lines = max(round(factor * (ring.numerics.lines - 1)) + 1, _FEWEST_LINES)
+    return replace(case, oring=replace(ring, numerics=replace(ring.numerics, lines=lines)))
+
+
+def mesh_error(
+    case: LubricationCase, rows: Sequence[SteadyFriction], workers: Workers, work: Path | None = None
+) -> FloatArray:
+    """Change of each friction of ``rows`` on the next mesh, as of `MapRuns.mesh_error`; else as of `run_map`."""
+    levels = [row_parts(other_mesh(case, factor)) for factor in (0.5, 2.0)]
+    label, prepare = f'{case.name}: coarser and finer mesh', partial(compile_for_map, case)
+    outcomes = try_parts(label, [part for level in levels for part in level], workers, Kept(work), prepare)
+    errors = np.array(
+        [
+            np.full(len(row.friction), np.nan)
+            if outcome.error
+            else np.abs(np.asarray((outcome.result or {})['friction']) / row.friction - 1.0)
+            for outcome, row in zip(outcomes, [*rows, *rows], strict=True)
+        ]
+    )
+    coarser, finer = errors[: len(rows)], errors[len(rows) :]
+    return np.where(np.isnan(finer), coarser, finer)
 
 
 def row_parts(case: LubricationCase) -> list[Part]:
@@ -138,21 +244,22 @@ def seal_document(computed: MapRuns, name: str) -> dict[str, Any]:
 
     The uncertainty is that of the samples. Without samples it is our choice, since nothing is measured here: one tenth
     of the friction; of an O-ring from its drawing 0.7, the error that was found against readings (docs/ehl.md). The
-    breakaway friction is the friction at the
-    lowest speed of the map over that at its reference speed, mean over the pressures.
+    breakaway friction is the friction at the lowest speed of the map over that at its reference speed, mean over the
+    pressures; of a map without speeds `STICTION_OF_A_RING`.
     """
-    law, case = computed.law, computed.case
+    case, law = computed.case, live_map(computed.law, computed.rows)
     if computed.uncertainty is None:
         relative_std = 0.7 if case.oring else 0.1
     else:
         relative_std = rounded(computed.uncertainty.relative_std, 3)
     creeping = fmean(law.sliding_friction(p, law.speeds[0]) / law.coulomb_friction(p) for p in law.pressures)
+    stiction = max(0.0, creeping - 1.0) if law.depends_on_speed else STICTION_OF_A_RING
     pressures = [rounded(value, 7) for value in law.pressures]
     elastic = presliding_of_map(law)
     document: dict[str, Any] = {
         'name': name,
         'source': f'computed by seal_friction ehl map from the case {case.name}; '
-        'steady sliding, mean of both directions',
+        f'steady sliding, mean of both directions. {computed.limits} {computed.mesh}'.strip(),
         'coulomb_law': 'friction_map',
         'friction_map': {
             'speeds': [rounded(value, 13) for value in law.speeds],  # their ratios have to be equal
@@ -162,10 +269,13 @@ def seal_document(computed: MapRuns, name: str) -> dict[str, Any]:
             'memory_length': rounded(law.memory_length, 7),
             'presliding_length': rounded(law.presliding_length, 7),
         },
-        'stiction_ratio': rounded(max(0.0, creeping - 1.0), 3),
+        'stiction_ratio': rounded(stiction, 3),
         'uncertainty': {'relative_std': relative_std},
         'identified_pressure': [pressures[0], pressures[-1]],
     }
+    asymmetry = rounded(pressure_asymmetry(computed.law, computed.rows), 3)
+    if abs(asymmetry) >= LEAST_ASYMMETRY:
+        document['pressure_asymmetry'] = {'asymmetry': asymmetry, 'full_pressure': pressures[-1]}
     if elastic is not None:
         numbers = asdict(elastic)
         document['presliding'] = {key: n if key == 'elements' else rounded(n, 7) for key, n in numbers.items()}

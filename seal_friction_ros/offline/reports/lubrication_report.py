@@ -10,7 +10,7 @@ from matplotlib.ticker import FuncFormatter
 
 from seal_friction_ros.core.foundation.units import BAR, MM
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
-from seal_friction_ros.offline.contact.lubrication_runs import MapRuns
+from seal_friction_ros.offline.contact.lubrication_runs import MARKED_MESH_ERROR, MapRuns
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports import verdicts
@@ -24,10 +24,20 @@ from seal_friction_ros.offline.work.status import command_line
 @house_style()
 def write_map_page(computed: MapRuns, out: Path) -> tuple[Path, ...]:
     """Write the page of a friction map; see `write_page`."""
+    shape = len(computed.rows), len(computed.law.speeds)
+    errors = np.zeros(shape) if computed.mesh_error is None else np.nan_to_num(computed.mesh_error, nan=np.inf)
     heads = ('speed [mm/s]', *(f'{row.pressure / BAR:.3g} bar' for row in computed.rows))
     rows = [
-        (number(speed / MM), *(number(float(row.friction[i]), 3) for row in computed.rows))
+        (
+            number(speed / MM),
+            *(_marked(float(row.friction[i]), error[i]) for row, error in zip(computed.rows, errors, strict=True)),
+        )
         for i, speed in enumerate(computed.law.speeds)
+    ]
+    reference = f'{number(computed.law.reference_speed / MM)}'
+    rows += [
+        (f'{reference}, {text}', *(number(each[k], 3) for each in computed.directions))
+        for k, text in enumerate(('towards the pressure', 'away from it'))
     ]
     table = Table(heads, rows)
     plots = [map_figure(computed)]
@@ -40,9 +50,20 @@ def write_map_page(computed: MapRuns, out: Path) -> tuple[Path, ...]:
         None if computed.uncertainty is None else computed.uncertainty.relative_std,
         '--seal-file' in command_line(),
     )
-    values = {'verdict': verdict, 'law': computed.law, 'map_table': table}
+    values = {
+        'verdict': verdict,
+        'law': computed.law,
+        'map_table': table,
+        'map_notes': (computed.limits, computed.mesh),
+    }
+    values |= {'is_marked': bool((errors > MARKED_MESH_ERROR).any())}
     values |= uncertainty_values(computed.uncertainty, computed.case.unknown)
     return write_case_page(out, 'lubrication_map', plots, computed.case, **values)
+
+
+def _marked(friction: float, mesh_error: float) -> str:
+    """A friction [N], with a mark if the mesh changes it."""
+    return f'{number(friction, 3)}{" *" if mesh_error > MARKED_MESH_ERROR else ""}'
 
 
 def write_case_page(

@@ -15,12 +15,18 @@ from seal_friction_ros.core.estimation.configuration import PLACEHOLDER
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import BAR, INCH, LBF, MM, PSI
-from seal_friction_ros.core.friction.actuator import ActuatorFriction, MountedSeal, Seal, actuator_friction
+from seal_friction_ros.core.friction.actuator import (
+    ActuatorFriction,
+    MountedSeal,
+    Seal,
+    actuator_friction,
+    breakaway_in,
+)
 from seal_friction_ros.core.friction.geometry import contact_length, projected_area, squeeze, stretch
 from seal_friction_ros.core.friction.laws.physics_based import PhysicsBased
 from seal_friction_ros.core.friction.laws.prior_art_chart import PriorArtChart
 from seal_friction_ros.core.friction.seal_file import parse_seal
-from seal_friction_ros.core.friction.states import is_at_rest, state_friction
+from seal_friction_ros.core.friction.states import is_at_rest, sign, state_friction
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports import verdicts
@@ -53,6 +59,10 @@ class ChartsSummary:
     coulomb_friction: tuple[float, ...]  # [N] of all ``seal_count`` seals, at each of ``pressures``
     measured: tuple[float, ...]
     """[N] mean dynamic friction of the tests of the thesis at each of ``pressures``; empty for another seal"""
+
+
+DIRECTIONS = (('towards the pressure', -1, ':'), ('away from it', 1, '-.'))
+"""Motion of a seal in chamber a, the direction of its rod, and the line of its curve"""
 
 
 @dataclass(frozen=True)
@@ -163,8 +173,8 @@ def friction_over_force_sum(
 ) -> FloatArray:
     """State friction [N] of a rod at rest at each force sum [N] (Figure 23; with stiction as measured)."""
     friction = shown.friction(pressure)
-    coulomb, stiction = friction.coulomb_friction, friction.stiction if use_stiction else 0.0
-    states = (state_friction(0.0, f, True, coulomb, coulomb + stiction) for f in force_sums.tolist())
+    held = {ahead: breakaway_in(friction, ahead, with_stiction=use_stiction) for ahead in (-1, 0, 1)}
+    states = (state_friction(0.0, f, True, friction.coulomb_friction, held[sign(f)]) for f in force_sums.tolist())
     return np.array([state.friction_force for state in states])
 
 
@@ -255,6 +265,10 @@ def seal_model_figure(shown: ChartedSeal) -> Plot:
     figure, ax = style.new_figure(title, 4.4)
     style.fill_band(ax, pressures / BAR, coulomb / size, BAND_95 * std / size, label=f'95 % band (± {BAND_95:.2f} std)')
     ax.plot(pressures / BAR, coulomb / size, color=style.BLUE, lw=1.8, label='Coulomb friction, model')
+    for text, rod, line in DIRECTIONS if shown.seal.pressure_asymmetry else ():
+        one_way = [shown.friction(p, rod * STATE_VELOCITY) for p in pressures]
+        sliding = np.array([f.coulomb_friction + f.velocity_friction for f in one_way])
+        ax.plot(pressures / BAR, sliding / size, color=style.BLUE, ls=line, lw=1.0, label=f'sliding {text}')
     ax.plot(pressures / BAR, (coulomb + stiction) / size, color=style.ORANGE, ls='--', label='breakaway force, model')
     if shown.is_thesis_seal:
         _draw_readings(ax, size)

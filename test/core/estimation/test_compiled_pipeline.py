@@ -34,6 +34,7 @@ from seal_friction_ros.core.friction.laws.law import FrictionLaw
 from seal_friction_ros.core.friction.laws.pressure_power_law import PressurePowerLaw
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.presliding import Presliding
+from seal_friction_ros.core.friction.pressure_asymmetry import PressureAsymmetry
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.temperature import TemperatureScale
 from seal_friction_ros.core.messages.blocks import Kind, Messages, UnsuitedError
@@ -97,12 +98,19 @@ SEALS |= {
             reference_speed=0.02,
         ),
     ),
+    'uneven': dataclasses.replace(
+        ONE,
+        coulomb_law=FrictionMap(speeds=(0.01,), pressures=(0.0, 5e6), frictions=(9.0, 22.0), reference_speed=0.01),
+        pressure_asymmetry=PressureAsymmetry(asymmetry=-0.4, full_pressure=3e6),
+        stiction_ratio=0.2,
+    ),
     'stribeck': dataclasses.replace(SEALS['ms28775_114_table'], velocity_terms=VelocityTerms(30.0, 4.0, 0.003, 0.1)),
 }
 
 
 OTHERS = (
-    'power', 'from_elsewhere', 'constant', 'mapped', 'stribeck', 'ms28775_114_prior_art', 'ms28775_114_stress',
+    'power', 'uneven', 'from_elsewhere', 'constant', 'mapped', 'stribeck', 'ms28775_114_prior_art',
+    'ms28775_114_stress',
 )  # fmt: skip
 WARM = TemperatureScale(reference=310.0, coefficient=0.013, coefficient_std=0.001, lowest=290.0, highest=340.0)
 ELASTIC = Presliding(stiffness=2e5, yield_exponent=1.5)
@@ -341,6 +349,7 @@ def compiled_frictions(seals, a, b, v, out):
         friction = friction_of_seals(seals, a[i], b[i], v[i])
         out[i, 0], out[i, 1], out[i, 2] = friction.coulomb_friction, friction.coulomb_friction_std, friction.stiction
         out[i, 3], out[i, 4] = friction.in_identified_range, friction.velocity_friction
+        out[i, 5] = friction.breakaway_asymmetry
 
 
 @pytest.mark.parametrize('actuator', sorted(ACTUATORS))
@@ -350,7 +359,7 @@ def test_the_friction_of_many_moments_is_that_of_each(actuator):
     edges = [0.0, -0.0, -1e4, 6894757.2931783, 4.5e7, *(SEALS[name].pressure_max for name in ACTUATORS[actuator])]
     a = np.concatenate([edges, random.uniform(-1e4, 9e6, 3000), random.uniform(0.0, 4.5e7, 500)])
     b, v = random.permutation(a), random.choice([0.0, -0.0, 0.001, -0.3, 9.0], len(a)) * random.random(len(a))
-    found = np.empty((len(a), 5))
+    found = np.empty((len(a), 6))
     compiled_frictions(for_compiler(seals), a, b, v, found)
     moments = zip(a.tolist(), b.tolist(), v.tolist(), strict=True)
     assert found.tobytes() == np.array([friction_of_seals(seals, *moment) for moment in moments], float).tobytes()

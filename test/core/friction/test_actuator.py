@@ -159,7 +159,7 @@ def test_a_law_alone_has_no_stiction_no_spread_and_no_range_and_is_in_chamber_a(
 
 
 def test_without_seals_there_is_no_friction():
-    assert friction_of_seals(NO_SEALS, 1e6, 2e6, 0.1) == (0.0, 0.0, 0.0, True, 0.0)
+    assert friction_of_seals(NO_SEALS, 1e6, 2e6, 0.1) == (0.0, 0.0, 0.0, True, 0.0, 0.0)
     assert sliding_friction_of_seals(NO_SEALS, 1e6, 2e6, 0.1, 1) == 0.0
 
 

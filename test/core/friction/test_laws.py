@@ -64,7 +64,8 @@ def test_a_map_is_linear_in_pressure_and_in_the_logarithm_of_the_speed(along, ac
     ('changes', 'complaint'),
     [
         ({'frictions': FRICTIONS[:-1]}, 'has 8 values for 3 speeds and 3 pressures'),
-        ({'speeds': (1e-3,), 'frictions': (1.0, 2.0, 3.0)}, 'has 3 values for 1 speeds and 3 pressures'),
+        ({'speeds': (1e-3,), 'frictions': (1.0, 2.0)}, 'has 2 values for 1 speeds and 3 pressures'),
+        ({'speeds': (), 'frictions': ()}, 'has 0 values for 0 speeds and 3 pressures'),
         ({'pressures': (1e6,), 'frictions': (1.0, 2.0, 3.0)}, 'has 3 values for 3 speeds and 1 pressures'),
         ({'speeds': (1e-3, 1e-3, 1e-1)}, 'speeds = .* does not increase'),
         ({'pressures': (1e6, 3e6, 3e6)}, 'pressures = .* does not increase'),
@@ -81,6 +82,15 @@ def test_a_map_of_two_by_two_and_of_nearly_equal_ratios_is_taken():
     assert law.columns_per_log_speed == pytest.approx(1.0 / math.log(10.0))
     small = friction_map(speeds=(1e-3, 1e-1), pressures=(0.0, 5e6), frictions=(1.0, 2.0, 3.0, 4.0))
     assert small.sliding_friction(2.5e6, 1e-2) == pytest.approx(2.5)
+
+
+@given(st.floats(0.0, 10.0), st.floats(0.0, 1.0))
+def test_a_map_of_one_speed_holds_at_every_speed(speed, across):
+    law = friction_map(speeds=(1e-2,), frictions=(7.0, 18.0, 40.0))
+    assert not law.depends_on_speed
+    assert law.sliding_friction(3e6 + across * 2e6, speed) == pytest.approx(18.0 + across * 22.0)
+    assert [law.sliding_friction(p, speed) for p in (0.0, 9e6)] == [7.0, 40.0]
+    assert law.coulomb_friction(3e6) == 18.0
 
 
 def test_the_coulomb_friction_of_a_map_is_that_at_its_reference_speed():

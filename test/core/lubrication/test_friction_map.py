@@ -99,6 +99,53 @@ def test_friction_of_a_ring_from_its_drawing_falls_with_speed_and_rises_with_pre
     assert law.presliding_length == pytest.approx(rows[1].friction[0] / rows[1].stiffness)
 
 
+def test_a_ring_that_lets_no_lubricant_in_has_one_friction_at_all_speeds(ring_row):
+    """A contact percolates at a real contact of 0.42. A seal of the paper stays far below."""
+    case, rows = ring_row
+    assert not module.carries_film(rows)
+    law = friction_map(case, rows, 1e-4)
+    live = module.live_map(law, rows)
+    assert not live.depends_on_speed
+    assert (live.speeds, live.memory_length) == ((case.motion.speed,), 0.0)
+    for pressure in (0.0, 1e5, 3e5, 9e5):
+        for speed in (0.0, 1e-4, 0.034, 1.0):
+            assert live.sliding_friction(pressure, speed) == pytest.approx(law.coulomb_friction(pressure))
+    stiffness = law.frictions[0] / law.presliding_length
+    assert live.frictions[0] / live.presliding_length == pytest.approx(stiffness)
+
+
+def test_the_share_of_a_direction_is_that_of_the_line_through_no_pressure():
+    """At 10 mm/s: 12 N towards and 8 N away at 1e5 Pa, where the mean is 10 N; half the share at half the pressure."""
+    law = dataclasses.replace(LAW, pressures=(0.0, 0.5e5, 1e5), frictions=(10.0,) * 9)
+    rows = [
+        module.SteadyFriction(p, np.full(3, 10.0), np.full(3, 9.0), np.array([0.0, d, 2.0 * d]), 2e4, 0)
+        for p, d in ((0.0, 0.0), (0.5e5, 2.0), (1e5, 4.0))
+    ]
+    assert module.directions(rows[2], 1e-2, law.speeds) == pytest.approx((12.0, 8.0))
+    assert module.pressure_asymmetry(law, rows) == pytest.approx(0.2)
+
+
+def test_a_ring_rubs_less_towards_its_pressure(ring_row):
+    case, rows = ring_row
+    assert -0.9 < module.pressure_asymmetry(friction_map(case, rows, 1e-4), rows) < -0.01
+
+
+def test_a_seal_that_lets_lubricant_in_keeps_its_speeds(rows):
+    assert module.carries_film(rows)
+    law = friction_map(CASE, rows, 1e-4)
+    assert module.live_map(law, rows) == law
+
+
+@pytest.mark.parametrize(('fall', 'is_levelled'), [(0.0004, True), (0.029, True), (0.04, False)])
+def test_a_fall_with_pressure_within_the_error_of_the_mesh_is_levelled(rows, fall, is_levelled):
+    falls = dataclasses.replace(LAW, frictions=(3.0, 2.0, 1.0, *(np.array([3.0, 2.0, 1.0]) * (1.0 - fall)).tolist()))
+    live = module.live_map(falls, rows)
+    assert (live.coulomb_friction(1e5) >= (1.0 - 1e-12) * live.coulomb_friction(0.0)) == is_levelled
+    assert live.frictions[:3] == falls.frictions[:3]
+    if not is_levelled:
+        assert live == falls
+
+
 def test_solid_friction_of_a_ring_is_at_most_tau_c_on_the_contact(ring_row):
     case, rows = ring_row
     film = oring_film(case, case.oring, 3e5)
@@ -201,7 +248,13 @@ def test_map_takes_both_ways_from_rest_speed_after_speed_and_its_mean(monkeypatc
     def friction(_model, state, velocity):
         return (10.0 if velocity > 0.0 else 14.0) + state, (4.0 if velocity > 0.0 else 5.0) + state
 
-    rest = SimpleNamespace(case=CASE), 0, 7.0
+    open_gap = ContactState(np.full(96, 4e-6), np.zeros(96), np.ones(96))
+    contact = profile_model(CASE, 0.0, 0.0).contact
+
+    class Counted(int):
+        gap = open_gap.gap
+
+    rest = SimpleNamespace(case=CASE, contact=contact), Counted(0), 7.0
     monkeypatch.setattr(module, '_at_rest', lambda case, pressure: rest if (case, pressure) == (CASE, 2e5) else None)
     monkeypatch.setattr(module, 'steady_state', steady)
     monkeypatch.setattr(module, '_friction', friction)
@@ -211,6 +264,8 @@ def test_map_takes_both_ways_from_rest_speed_after_speed_and_its_mean(monkeypatc
     assert row.solid == pytest.approx(4.5 + after)
     assert row.direction_difference == pytest.approx(np.full(5, 4.0))  # the pressure is on the left
     assert (row.pressure, row.stiffness, row.retried_steps) == (2e5, 7.0, 20)
+    assert row.thinnest == pytest.approx(4e-6 / CASE.topography.rms_height)
+    assert 0.0 < row.real_contact < 0.1
     speeds = np.geomspace(1e-3, 0.1, 5)
     assert [state for state, _ in begun] == [0, 1, 2, 3, 4] * 2
     assert [velocity for _, velocity in begun] == pytest.approx([*speeds, *-speeds])

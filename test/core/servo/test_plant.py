@@ -18,6 +18,7 @@ from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_frict
 from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
+from seal_friction_ros.core.friction.pressure_asymmetry import PressureAsymmetry
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.servo.controller import ServoController
@@ -285,6 +286,22 @@ def test_force_ramp_to_99_percent_of_breakaway_moves_nothing_at_101_it_moves(dir
     for share in np.linspace(0.99, 1.01, 200):
         state = advance(SERVO, state, 0.0, direction * share * breakaway)
     assert direction * state.position > 0.0
+
+
+@pytest.mark.parametrize('direction', [1.0, -1.0])
+def test_a_rod_breaks_away_and_slides_by_its_direction_relative_to_the_pressure(direction):
+    """One rod seal in chamber a: out of it is away from its pressure, in is towards it."""
+    uneven = dataclasses.replace(SEAL, pressure_asymmetry=PressureAsymmetry(asymmetry=-0.4, full_pressure=1e6))
+    servo = ServoParameters(seals=(MountedSeal(uneven, 'a'),))
+    state = plant(servo)
+    mean = actuator_friction((MountedSeal(SEAL, 'a'),), state.charge_a, 0.0)
+    breakaway = outputs(servo, state, load_force=direction).breakaway_force
+    factor = 1.0 + 0.4 * direction
+    assert breakaway == pytest.approx(factor * (mean.coulomb_friction + mean.stiction), rel=1e-3)
+    assert advance(servo, state, 0.0, direction * 0.99 * breakaway).position == 0.0
+    assert direction * advance(servo, state, 0.0, direction * 1.01 * breakaway).position > 0.0
+    slides = outputs(servo, plant(servo, velocity=0.02 * direction, direction=int(direction)))
+    assert slides.friction_force == pytest.approx(direction * factor * mean.coulomb_friction, rel=1e-3)
 
 
 def test_rod_meets_the_stops_and_stays_within():

@@ -1,15 +1,22 @@
 """``seal_friction ehl map``: numbers, pages and seal files from case files; interrupted work resumes."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from harness.ehl_cases import COARSE_RING, answer, measured_bag
 
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.lubrication.friction_map import steady_friction
+from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, MapGrid
+from seal_friction_ros.core.lubrication.seal_profile import LubricationNumerics
 from seal_friction_ros.core.messages.records import Status
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.bags.recorded_run import read_run
 from seal_friction_ros.offline.commands.main import main
+from seal_friction_ros.offline.contact import lubrication_runs as runs
+from seal_friction_ros.offline.work.finished_parts import Part
 
 
 def test_map_becomes_a_seal_file_that_the_estimator_takes(small, tmp_path, capsys):
@@ -25,6 +32,30 @@ def test_map_becomes_a_seal_file_that_the_estimator_takes(small, tmp_path, capsy
     assert main(['charts', str(seal_file), '--out', str(tmp_path / 'charts.html')]) == 0
 
 
+def test_the_error_of_a_map_is_its_change_on_the_next_finer_mesh_or_on_the_coarser_one(monkeypatch):
+    grid = MapGrid(velocity_min=1e-2, velocity_max=0.1, velocities=2, pressures=2)
+    case = LubricationCase(name='seal', numerics=LubricationNumerics(cells=48), map=grid)
+    row = steady_friction(case, 0.0)
+
+    def rows(other):
+        """Of the coarser mesh 10 % more, of the finer one 2 % less, which fails in the second row."""
+        if other.numerics.cells < case.numerics.cells:
+            return [Part(f'c{i}', ('friction',), partial(dict, friction=1.1 * row.friction)) for i in range(2)]
+        finer = partial(dict, friction=0.98 * row.friction)
+        return [Part('f0', ('friction',), finer), Part('f1', ('friction',), partial(int, 'fails'))]
+
+    monkeypatch.setattr(runs, 'row_parts', rows)
+    found = runs.mesh_error(case, [row, row], 1)
+    assert found[0] == pytest.approx(0.02)
+    assert found[1] == pytest.approx(0.1)
+
+
+def test_the_meshes_of_a_ring_are_17_33_and_65_lines_and_those_of_another_seal_halve_its_cells():
+    ring, profile = runs.load_case('oring_delft'), LubricationCase(name='seal')
+    assert [runs.other_mesh(ring, factor).oring.numerics.lines for factor in (0.5, 2.0)] == [17, 65]
+    assert [runs.other_mesh(profile, factor).numerics.cells for factor in (0.5, 2.0)] == [113, 452]
+
+
 def test_recording_with_a_mapped_seal_replays_to_the_same_bytes_and_rubs_less_the_faster_it_slides(small, tmp_path):
     seal_file = tmp_path / 'mapped.yaml'
     assert main(['ehl', 'map', small, '--seal-file', str(seal_file), '--jobs', '1']) == 0
@@ -34,10 +65,11 @@ def test_recording_with_a_mapped_seal_replays_to_the_same_bytes_and_rubs_less_th
     speed, friction = np.abs(recorded.velocity), np.abs(recorded.friction_force)
     shears = recorded.status & int(Status.PRESLIDING) != 0  # the map tells how far the seal shears before it slides
     assert shears.any()
-    sliding = (recorded.state == FrictionState.SLIDING) & ~shears
-    slow, fast = sliding & (speed < 15e-3), sliding & (speed > 30e-3)
-    assert friction[slow].min() > friction[fast].max()
-    assert friction[slow].mean() > 1.1 * friction[fast].mean()  # it follows the speed over a length, by the map
+    for direction in (-1, 1):  # towards the pressure and away from it
+        sliding = (recorded.state == FrictionState.SLIDING) & ~shears & (recorded.direction == direction)
+        slow, fast = sliding & (speed < 15e-3), sliding & (speed > 30e-3)
+        assert friction[slow].min() > friction[fast].max()
+        assert friction[slow].mean() > 1.1 * friction[fast].mean()  # it follows the speed over a length, by the map
     assert np.ptp(recorded.coulomb_friction) == 0.0  # that of the pressure alone, at the reference speed
 
 
@@ -58,7 +90,17 @@ def test_an_o_ring_becomes_a_seal_file_from_its_drawing_that_the_node_takes(ring
     table = np.array(found['friction_N'])
     assert (np.diff(table, axis=0) > 0.0).all()
     seal = parse_seal(read_yaml(written))
-    assert seal.coulomb_law.sliding_friction(1e6, 1e-3) == pytest.approx(table[1, 0], rel=1e-3)
+    at_reference = seal.coulomb_law.coulomb_friction(1e6)  # 34 mm/s, between the second and the third speed
+    assert table[1, 2] < at_reference < table[1, 1]
+    assert [seal.coulomb_law.sliding_friction(1e6, speed) for speed in (1e-3, 0.1)] == [at_reference] * 2
+    assert not found['speeds_in_seal_file']
+    assert max(found['real_contact_at_rest']) > 0.42
+    assert 'no lubricant gets under it' in read_yaml(written)['source']
+    assert seal.stiction_ratio == 0.13
+    assert found['towards_pressure_N'][1] < at_reference < found['away_from_pressure_N'][1]
+    assert seal.pressure_asymmetry.full_pressure == 1e6
+    half = found['away_from_pressure_N'][1] - found['towards_pressure_N'][1]
+    assert seal.pressure_asymmetry.asymmetry == pytest.approx(-0.5 * half / at_reference, abs=1e-3)
     assert seal.presliding is not None
     assert main(['charts', str(written), '--out', str(tmp_path / 'charts.html')]) == 0
 

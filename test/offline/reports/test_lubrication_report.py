@@ -22,7 +22,16 @@ def computed_map() -> MapRuns:
     law = FrictionMap(speeds, pressures, (0.9, 0.7, 0.4, 1.1, 0.8, 0.4), 1e-2, 2.2e-4, 4.2e-5)
     frictions = np.array(law.frictions).reshape(2, 3)
     rows = [
-        SteadyFriction(**{**dict.fromkeys(SteadyFriction._fields), 'pressure': p, 'friction': f, 'solid': 0.9 * f})
+        SteadyFriction(
+            pressure=p,
+            friction=f,
+            solid=0.9 * f,
+            direction_difference=np.full(3, -1e-6 * p),
+            stiffness=2e4,
+            retried_steps=0,
+            real_contact=0.1,
+            thinnest=0.8,
+        )
         for p, f in zip(pressures, frictions, strict=True)
     ]
     return MapRuns(CASE, law, rows, 0)
@@ -33,7 +42,41 @@ def test_a_map_shows_friction_by_speed_and_pressure(tmp_path):
     page = checked_page(tmp_path / 'map.html')
     assert page.figures == ['friction_map']
     assert list(page.table('speed [mm/s]')[0].values()) == ['1.00', '0.900', '1.100']
+    assert list(page.table('speed [mm/s]')[-2].values()) == ['10.00, towards the pressure', '0.700', '0.750']
+    assert list(page.table('speed [mm/s]')[-1].values()) == ['10.00, away from it', '0.700', '0.850']
     assert page.tiles['distance before the seal slides'] == '0.042 mm'
+
+
+def test_a_map_says_where_no_lubricant_gets_under_the_seal_and_where_the_flow_factors_end(tmp_path):
+    computed = computed_map()
+    for name, changes, words in (
+        ('sealed', {'real_contact': 0.9}, 'above 0.42 no lubricant gets under it'),
+        ('thin', {'thinnest': 0.3}, 'the gap is 0.3 of the roughness'),
+    ):
+        rows = [*computed.rows[:1], computed.rows[1]._replace(**changes)]
+        report.write_map_page(computed._replace(rows=rows), tmp_path / f'{name}.html')
+        assert any(words in text for text in checked_page(tmp_path / f'{name}.html').texts['p.note'])
+    assert computed.limits == ''
+
+
+def test_a_map_marks_what_the_mesh_changes_by_more_than_3_percent_and_warns_above_5(tmp_path):
+    errors = np.array([[0.001, 0.02, 0.031], [np.nan, 0.012, 0.14]])
+    computed = computed_map()._replace(mesh_error=np.nan_to_num(errors, nan=0.0))
+    report.write_map_page(computed, tmp_path / 'map.html')
+    page = checked_page(tmp_path / 'map.html')
+    assert [list(row.values())[1:] for row in page.table('speed [mm/s]')[:3]] == [
+        ['0.900', '1.100'],
+        ['0.700', '0.800'],
+        ['0.400 *', '0.400 *'],
+    ]
+    assert (
+        'Mesh: the next one changes the friction by 14 % at most, at 100 mm/s and 1 bar, and by 2 % at most at 10 '
+        'mm/s; above 5 % a number is not converged.'
+    ) in page.texts['p.note']
+    assert 'not converged' not in computed._replace(mesh_error=np.full((2, 3), 0.049)).mesh
+    unknown = computed._replace(mesh_error=errors)
+    assert 'neither the finer nor the coarser one can be computed at 1 mm/s and 1 bar' in unknown.mesh
+    assert unknown.numbers()['mesh_error'][1] == [None, 0.012, 0.14]
 
 
 def test_a_map_with_samples_shows_what_is_unknown_its_quantiles_and_what_failed(tmp_path):
