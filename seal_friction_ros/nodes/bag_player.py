@@ -92,13 +92,9 @@ class BagPlayer(Node):
 def play(player: BagPlayer, bag: Path, rate: float) -> dict[str, str]:
     """Play a bag; return the number of velocity samples and the round-trip time from sample to estimate.
 
-    Args:
-        player: Node that publishes.
-        bag: Folder of the bag.
-        rate: Multiple of the pace of the bag; 0: as fast as the estimator answers.
+    The rate is a multiple of the pace of the bag; 0: as fast as the estimator answers.
 
-    Raises:
-        BagError: The bag cannot be read, or the estimator stopped answering.
+    BagError: the bag cannot be read, or the estimator stopped answering.
     """
     start = time.monotonic()
     first: int | None = None

@@ -5,6 +5,7 @@ Before, the interpreter itself starts for some 50 ms, in which SIGINT ends it wi
 
 import signal
 import sys
+from functools import partial
 
 from seal_friction_ros.compiled_code import keep_compiled_code
 from seal_friction_ros.packages import MissingPackageError, needed
@@ -19,27 +20,13 @@ def _run(module: str) -> int:
         return 2
 
 
-def friction_estimator() -> int:
-    """Run the estimator."""
-    return _run('friction_estimator')
-
-
-def machine_estimator() -> int:
-    """Run the estimator of a machine."""
-    return _run('machine_estimator')
+friction_estimator = partial(_run, 'friction_estimator')
+machine_estimator = partial(_run, 'machine_estimator')
+friction_monitor = partial(_run, 'friction_monitor')
+bag_player = partial(_run, 'bag_player')
 
 
 def servo_simulator() -> int:
-    """Run the simulator."""
+    """Run the simulator, whose compiled code is kept."""
     keep_compiled_code()
     return _run('servo_simulator')
-
-
-def friction_monitor() -> int:
-    """Run the live view."""
-    return _run('friction_monitor')
-
-
-def bag_player() -> int:
-    """Run the player."""
-    return _run('bag_player')

@@ -3,31 +3,20 @@
 import time
 from collections import Counter, deque
 from collections.abc import Collection
+from functools import reduce
+from operator import or_
 
 from diagnostic_msgs.msg import DiagnosticStatus
 
+from seal_friction_ros.core.estimation import seal_health
 from seal_friction_ros.core.estimation.adaptation import AdaptationState
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorState
 from seal_friction_ros.core.estimation.pipeline import Turn
-from seal_friction_ros.core.estimation.seal_health import (
-    SealHealth,
-    Starts,
-    findings,
-    followed,
-    health_values,
-    with_sample,
-)
+from seal_friction_ros.core.estimation.seal_health import SealHealth, Starts, findings, health_values
 from seal_friction_ros.core.estimation.swings import NO_SWING, Swing
+from seal_friction_ros.core.messages import records
 from seal_friction_ros.core.messages.layouts import CLOCK_TOPIC, INPUTS
-from seal_friction_ros.core.messages.records import (
-    NEVER,
-    NO_ESTIMATE,
-    FeedForward,
-    FrictionEstimate,
-    Limited,
-    Output,
-    Status,
-)
+from seal_friction_ros.core.messages.records import FeedForward, FrictionEstimate, Limited, Status
 from seal_friction_ros.nodes.graph_watch import GraphFindings
 from seal_friction_ros.nodes.managed_node import status_of
 
@@ -37,20 +26,15 @@ _NEAR_REST_MESSAGES = {
     Status.MOTION_UNCERTAIN: 'of rod_velocity near rest or too noisy to tell rest from motion',
     Status.SLOWER_THAN_IDENTIFIED: 'of rod_velocity slower than the seals were identified',
 }
-_LARGEST_SHARE = {
-    Limited.CLAMP: 0.01,
-    Limited.SLEW: 0.2,
-    Limited.FADE: 0.0,
-}
+_LARGEST_SHARE = {Limited.CLAMP: 0.01, Limited.SLEW: 0.2, Limited.FADE: 0.0}
 """[-] of the feed-forwards; each reversal slews"""
 _LIMIT_MESSAGES = {
     Limited.CLAMP: 'cut by force_limit',
     Limited.SLEW: 'held back by slew_limit',
     Limited.FADE: 'faded: an input or the reference is not usable',
 }
-_ESTIMATES = {
-    f'estimates {bit.name}': int(bit) for bit in Status
-}  # whole numbers: with flags a report takes twice as long
+# Whole numbers: with flags a report takes twice as long.
+_ESTIMATES = {f'estimates {bit.name}': int(bit) for bit in Status}
 _FEEDFORWARDS = {f'feed-forwards {bit.name}': int(bit) for bit in Limited}
 _FEEDFORWARD_SHARES = {f'feed-forward {bit.name} share': int(bit) for bit in Limited}
 _MOST_REVERSALS = 50  # [1/s] of the force; faster motion is not compensated, so this is chatter
@@ -109,11 +93,7 @@ class MissingSamples:
 
 
 class EstimatorDiagnostics:
-    """Counts since activation, and rates, ages and latencies of the present interval.
-
-    Args:
-        inputs: Names of the inputs.
-    """
+    """Counts since activation, and rates, ages and latencies of the present interval, by names of inputs."""
 
     def __init__(self, inputs: Collection[str] = INPUTS) -> None:
         self._inputs = inputs
@@ -123,10 +103,10 @@ class EstimatorDiagnostics:
         self._by_status: Counter[int] = Counter()
         self._feedforwards_by_limit: Counter[int] = Counter()
         self._feedforward_force = self._feedforward_sign = 0.0
-        self._estimate = NO_ESTIMATE
+        self._estimate = records.NO_ESTIMATE
         self._latencies: list[int] = []
         self._health, self._starts = SealHealth(), Starts()
-        self._clock = NEVER  # [ns] newest simulated time
+        self._clock = records.NEVER  # [ns] newest simulated time
         self._newest: dict[type, FrictionEstimate | FeedForward] = {}
         self._status = self._limited = 0  # bits of all answers since the newest were taken
         self.start_interval()
@@ -173,9 +153,9 @@ class EstimatorDiagnostics:
 
     def on_adaptation(self, turn: Turn | None) -> None:
         """Follow what is learnt from the newest sample, whose estimate `on_estimate` has counted."""
-        self._starts = with_sample(self._starts, self._estimate)
+        self._starts = seal_health.with_sample(self._starts, self._estimate)
         if turn is not None:
-            self._health = followed(self._health, *turn)
+            self._health = seal_health.followed(self._health, *turn)
 
     def on_reset(self) -> None:
         """Forget the reversals: the adaptation has."""
@@ -201,7 +181,7 @@ class EstimatorDiagnostics:
         self._newest[FeedForward] = feedforward
         self._limited |= feedforward.limited
 
-    def take_newest(self) -> list[Output]:
+    def take_newest(self) -> list[records.Output]:
         """The newest answers since the last call, for who looks on: each with the bits of all answers since then."""
         bits = {FrictionEstimate: {'status': self._status}, FeedForward: {'limited': self._limited}}
         found = [answer._replace(**bits[kind]) for kind, answer in self._newest.items()]
@@ -257,13 +237,9 @@ class EstimatorDiagnostics:
         if not self._latencies and (seconds > _SHORTEST_SILENCE or not self._estimated_before):
             return DiagnosticStatus.STALE, 'no rod_velocity received'
         estimates = self._by_status - self._status_before
-        status = 0
-        for bits in estimates:
-            status |= bits
+        status = reduce(or_, estimates, 0)
         status &= ~(sum(_NEAR_REST_MESSAGES) | Status.PRESLIDING)  # seals shear in every reversal
-        said: list[str] = []
-        if parameters is not None:
-            said = findings(parameters, self._health, status)
+        said = [] if parameters is None else findings(parameters, self._health, status)
         said += self._late()
         if status:
             bits = {bit: _share(estimates, bit) for bit in Status if status & bit}
@@ -273,11 +249,8 @@ class EstimatorDiagnostics:
             names = ', '.join(sorted((self._malformed - self._malformed_before).keys()))
             said.append(f'malformed messages on {names}')
         said += self._feedforward_findings(seconds)
-        said += [
-            f'{_share(estimates, bit):.0%} {message}'
-            for bit, message in _NEAR_REST_MESSAGES.items()
-            if _share(estimates, bit) > _LARGEST_NEAR_REST
-        ]
+        near_rest = {message: _share(estimates, bit) for bit, message in _NEAR_REST_MESSAGES.items()}
+        said += [f'{share:.0%} {message}' for message, share in near_rest.items() if share > _LARGEST_NEAR_REST]
         if swing.doubted > 0.0 and _share(estimates, Status.MOTION_UNCERTAIN) > _LARGEST_NEAR_REST:
             way = f'rod_velocity swings by {swing.doubted * 1e6:.0f} um'
             said.append(f'{way}, the force sum does not show it: hum, or a wrong force sum')
@@ -288,9 +261,8 @@ class EstimatorDiagnostics:
         said = []
         for name, lateness in self._lateness.items():
             if not -_LARGEST_LATENESS < lateness < _LARGEST_QUEUE:
-                said.append(
-                    f'the clock of the publisher of {name} differs by {-lateness * 1e-9:.3f} s: no feed-forward'
-                )
+                clock = f'the clock of the publisher of {name}'
+                said.append(f'{clock} differs by {-lateness * 1e-9:.3f} s: no feed-forward')
             elif lateness > _LARGEST_LATENESS:
                 late = f'{name} comes up to {lateness * 1e-6:.0f} ms late'
                 said.append(f'{late}: this node is too slow, its machine too busy, or the clock of the publisher wrong')
@@ -299,11 +271,8 @@ class EstimatorDiagnostics:
     def _feedforward_findings(self, seconds: float) -> list[str]:
         """What limits the feed-forward more than a motion does by itself."""
         recent = self._feedforwards_by_limit - self._limits_before
-        said = [
-            f'feed-forward {_share(recent, bit):.0%} {_LIMIT_MESSAGES[bit]}'
-            for bit, largest in _LARGEST_SHARE.items()
-            if _share(recent, bit) > largest
-        ]
+        beyond = {bit: share for bit, most in _LARGEST_SHARE.items() if (share := _share(recent, bit)) > most}
+        said = [f'feed-forward {share:.0%} {_LIMIT_MESSAGES[bit]}' for bit, share in beyond.items()]
         if self._reversals > _MOST_REVERSALS * seconds:
             said.append(f'feed-forward reverses {self._reversals / seconds:.0f} times a second')
         return said
@@ -350,10 +319,8 @@ def _share(by_bits: Counter[int], bit: int) -> float:
 
 def latency_values(latencies: list[int], what: str = 'latency') -> dict[str, str]:
     """Median and 99th percentile [us] of latencies [ns], by their diagnostics keys."""
-    if not latencies:
-        return {f'{what} p50 [us]': 'none', f'{what} p99 [us]': 'none'}
-    ordered = sorted(latencies)
-    return {
-        f'{what} p{percent} [us]': f'{ordered[min(len(ordered) * percent // 100, len(ordered) - 1)] / 1e3:.1f}'
-        for percent in (50, 99)
-    }
+    ordered, values = sorted(latencies), {}
+    for percent in (50, 99):
+        place = min(len(ordered) * percent // 100, len(ordered) - 1)
+        values[f'{what} p{percent} [us]'] = f'{ordered[place] / 1e3:.1f}' if ordered else 'none'
+    return values

@@ -14,17 +14,12 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
+from seal_friction_ros.core.estimation import node_options
 from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationSettings
 from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING, Configuration, SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
-from seal_friction_ros.core.estimation.node_options import (
-    ADAPTATION_PREFIX,
-    FEEDFORWARD_PREFIX,
-    InputOptions,
-    MachineOptions,
-    RecordingOptions,
-)
+from seal_friction_ros.core.estimation.node_options import FEEDFORWARD_PREFIX, RecordingOptions
 from seal_friction_ros.core.foundation.parameters import ParameterGroup
 from seal_friction_ros.core.machine.gauge_or_absolute import Lowest, pressure_remarks
 from seal_friction_ros.core.machine.machine import (
@@ -42,18 +37,10 @@ from seal_friction_ros.core.machine.machine import (
 from seal_friction_ros.core.machine.machine_file import Actuator, MachineFile, own_file
 from seal_friction_ros.core.machine.machine_snapshot import machine_text, snapshot_of
 from seal_friction_ros.core.machine.outputs import Command, due_commands
+from seal_friction_ros.core.messages import layouts
 from seal_friction_ros.core.messages.coder import encode, encode_text, type_of
-from seal_friction_ros.core.messages.definitions import full_name, parse_definition
-from seal_friction_ros.core.messages.layouts import (
-    CLOCK_TOPIC,
-    CLOCK_TYPE,
-    CONFIGURATION_TYPE,
-    ESTIMATE_TYPE,
-    MACHINE_TYPE,
-    NEWEST_TYPE,
-    OUTPUTS,
-    TICK_TYPE,
-)
+from seal_friction_ros.core.messages.definitions import full_name
+from seal_friction_ros.core.messages.layouts import CLOCK_TOPIC, CONFIGURATION_TYPE, MACHINE_TYPE, OUTPUTS, TICK_TYPE
 from seal_friction_ros.core.messages.records import FeedForward, Output, WatchdogTick
 from seal_friction_ros.core.messages.together import NamedAnswer, TopicMessage, encode_newest, encode_together
 from seal_friction_ros.files import load_configuration, read_machine
@@ -66,7 +53,7 @@ from seal_friction_ros.nodes.managed_node import OVERDUE, ManagedNode, message_c
 from seal_friction_ros.nodes.recording import Recording
 from seal_friction_ros.nodes.subscription import taken, with_source_time
 from seal_friction_ros.offline.bags.bag import STATE_NAME, STATE_TYPE
-from seal_friction_ros.offline.bags.definitions import message_definition
+from seal_friction_ros.offline.bags.definitions import installed_definitions
 
 SWITCH_INTERVAL = 5e-5  # [s] longest time that the recorder thread delays a sample; Python's default is 5 ms
 _OPTIONAL_INPUTS = ('servo_reference', 'rod_position', 'seal_temperature')  # without them there are good estimates
@@ -81,13 +68,9 @@ _INPUT_PERIOD = 0.5  # [s]
 _LARGEST_CLOCK_STEP = 10_000_000  # [ns] a clock that is further off was set
 _BACKLOG = 5_000_000  # [ns] late by more, others may wait behind a message: the node takes them all in one go
 _MOST_WAITING = 10_000  # [messages] that it takes in one go
-_SORTING = (
-    1_000_000_000  # [ns] after a late message, until the executor has heard of all that was taken before its turn
-)
+_SORTING = 1_000_000_000  # [ns] after a late message, until the executor has heard of all taken before its turn
 _STOP_PERIOD = 0.005  # [s] between two forces while the node stops
-_LAST_FORCES = (
-    10  # number of forces of 0 N at the end: a subscriber may lose what it has not taken when a publisher goes
-)
+_LAST_FORCES = 10  # of 0 N at the end: a subscriber may lose what it has not taken when a publisher goes
 _HEALTH, _MONITOR = 'health', 'monitor'  # keys of their publishers
 _TOPIC_OF = {type_name: topic for topic, type_name in OUTPUTS.items()}
 
@@ -136,7 +119,7 @@ class EstimatorNode(ManagedNode):
         self._is_change_due, self._applied = False, 0  # [ns] of `time.perf_counter_ns`
         self._sets = self._applications = 0  # of parameters since the last report
         super().__init__(name, groups, **kwargs)
-        self._recording = Recording(self.get_fully_qualified_name())
+        self.recording = Recording(self.get_fully_qualified_name())
         for service, act, refusal in (
             ('start_recording', self._start_recording, 'not active: nothing to record'),
             ('stop_recording', self._stop_recording, ''),
@@ -150,7 +133,7 @@ class EstimatorNode(ManagedNode):
         """Read the mapping file; the parameters of each of its actuators begin with its name."""
         if not self.has_parameter('machine'):
             return ()
-        name = self.settings(MachineOptions).machine
+        name = self.settings(node_options.MachineOptions).machine
         if not name:
             raise ValueError('machine is not set: give the mapping file, -p machine:=robot.yaml')
         self._mapping = read_machine(name)
@@ -165,11 +148,11 @@ class EstimatorNode(ManagedNode):
         numbers = range(len(self._file.actuators))
         self._plans: dict[str, TopicPlan] = {
             **self._machine.plans,
-            CLOCK_TOPIC: record_plan(CLOCK_TOPIC, CLOCK_TYPE, numbers),
+            CLOCK_TOPIC: record_plan(CLOCK_TOPIC, layouts.CLOCK_TYPE, numbers),
         }
         self._types = {topic: full_name(self._file.topics[topic]) for topic in self._machine.plans}
         if self.get_parameter('use_sim_time').value:
-            self._types[CLOCK_TOPIC] = CLOCK_TYPE
+            self._types[CLOCK_TOPIC] = layouts.CLOCK_TYPE
         self._new_statistics()
         self._create_outputs()
         ticks = [self.resolve_topic_name(f'{actuator.name or "~"}/watchdog_tick') for actuator in self._file.actuators]
@@ -198,17 +181,15 @@ class EstimatorNode(ManagedNode):
         self._has_rest = self._file.together or bool(outputs)  # to be sent after the answers
         for topic, kind in outputs.items():
             self._create_output(('', topic), topic, full_name(kind))
-        self._outputs[CONFIGURATION_TYPE] = self.create_lifecycle_publisher(
-            message_class(CONFIGURATION_TYPE), '~/configuration', qos.LATCHED
-        )
+        kind = message_class(CONFIGURATION_TYPE)
+        self._outputs[CONFIGURATION_TYPE] = self.create_lifecycle_publisher(kind, '~/configuration', qos.LATCHED)
         self._topics = {key: publisher.topic_name for key, publisher in self._outputs.items()}
 
     def _made(self) -> Machine:
         """Machine with the present parameters."""
         configurations = {actuator.name: self._configuration(actuator) for actuator in self._file.actuators}
         kinds = self._file.topics.values() if self._mapping else ()
-        definitions = {kind: parse_definition(kind, message_definition(full_name(kind))[0]) for kind in kinds}
-        return make_machine(self._file, configurations, definitions)
+        return make_machine(self._file, configurations, installed_definitions(kinds))
 
     def _configuration(self, actuator: Actuator) -> Configuration:
         try:
@@ -218,17 +199,13 @@ class EstimatorNode(ManagedNode):
 
     def _changed(self, actuator: MachineActuator) -> MachineActuator:
         """Actuator with the present parameters; itself if they are as they were."""
-        settings, feedforward, adaptation = self._settings(actuator.mapping)
-        configuration = replace(
-            actuator.configuration, settings=settings, feedforward=feedforward, adaptation=adaptation
-        ).without_placeholder_force()
+        names = ('settings', 'feedforward', 'adaptation')
+        changed = dict(zip(names, self._settings(actuator.mapping), strict=True))
+        configuration = replace(actuator.configuration, **changed).without_placeholder_force()
         if configuration == actuator.configuration:
             return actuator
-        return replace(
-            actuator,
-            configuration=configuration,
-            pipeline=configuration.parameters(actuator.pipeline.estimator.seals),
-        )
+        pipeline = configuration.parameters(actuator.pipeline.estimator.seals)
+        return replace(actuator, configuration=configuration, pipeline=pipeline)
 
     def _settings(self, actuator: Actuator) -> list[Any]:
         """Present settings of estimator, feed-forward and adaptation of an actuator."""
@@ -275,9 +252,8 @@ class EstimatorNode(ManagedNode):
     def _create_timers(self) -> None:
         """Timers of the graph, the watchdog and the health, and the publisher of the health."""
         self._outputs[_HEALTH] = self.create_publisher(DiagnosticArray, '~/health', 10)
-        self._outputs[_MONITOR] = self.create_publisher(
-            message_class(NEWEST_TYPE), '~/monitor', qos.best_effort(qos.STREAM)
-        )
+        kind = message_class(layouts.NEWEST_TYPE)
+        self._outputs[_MONITOR] = self.create_publisher(kind, '~/monitor', qos.best_effort(qos.STREAM))
         self.has_viewer = False
         self._newest_inputs.clear()
         self._state_topic = self.resolve_topic_name(f'~/{STATE_NAME}')
@@ -293,7 +269,7 @@ class EstimatorNode(ManagedNode):
         if self.active:
             self.fade_out()
         self.active = False
-        if outcome := self._recording.close():
+        if outcome := self.recording.close():
             self.get_logger().info(outcome)
 
     # --- the live path ---
@@ -310,7 +286,7 @@ class EstimatorNode(ManagedNode):
             self._on_malformed(name, error)
             self._look_after_timers(began)
             return
-        received, before = time.monotonic_ns() + self._receipt_offset, self._state  # `_now`: a call less
+        received, before = time.monotonic_ns() + self._receipt_offset, self._state  # `now`: a call less
         sent = received - lateness if received > lateness else 0
         if self._sent:
             self._sent.clear()
@@ -319,7 +295,7 @@ class EstimatorNode(ManagedNode):
         done = time.perf_counter_ns()
 
         # Nobody waits for what follows.
-        self._recording.record(self._topics[name], self._types[name], received, data, sent)
+        self.recording.record(self._topics[name], self._types[name], received, data, sent)
         if self.has_viewer:
             self._newest_inputs[self._topics[name]] = TopicMessage(self._topics[name], self._types[name], data)
         if not plan.holds_records:
@@ -330,7 +306,7 @@ class EstimatorNode(ManagedNode):
         if self._sent:
             self._record_answers(commands, done - began)
             self._follow(before)
-            self._recording.flush_if_idle()
+            self.recording.flush_if_idle()
         self._look_after_timers(done)
 
     def _on_malformed(self, name: str, error: ValueError) -> None:
@@ -364,15 +340,15 @@ class EstimatorNode(ManagedNode):
         for name, answer, data in self._sent:
             kind, statistics = type_of(answer), self._statistics[name]
             if not self._together:
-                self._recording.record(self._topics[name, kind], kind, self._now(), data)
-            if kind == ESTIMATE_TYPE:
+                self.recording.record(self._topics[name, kind], kind, self.now(), data)
+            if kind == layouts.ESTIMATE_TYPE:
                 statistics.on_estimate(answer, latency)
             else:
                 statistics.on_feedforward(answer)
         if self._together:
-            self._recording.record(self._topics['', MACHINE_TYPE], MACHINE_TYPE, self._now(), self._together)
+            self.recording.record(self._topics['', MACHINE_TYPE], MACHINE_TYPE, self.now(), self._together)
         for command in commands:
-            self._recording.record(command.topic, full_name(command.type_name), self._now(), command.data)
+            self.recording.record(command.topic, full_name(command.type_name), self.now(), command.data)
 
     def _follow(self, before: MachineState) -> None:
         """Follow pressures and adaptation of the actuators that have answered."""
@@ -391,9 +367,9 @@ class EstimatorNode(ManagedNode):
         """Renew each feed-forward that no velocity sample renews, so that it fades out."""
         if not self.active:
             return False
-        numbers = due(self._state, self._now())
+        numbers = due(self._state, self.now())
         for number in numbers:
-            self._tick(number, self._now())  # a bag holds each message at a time of its own
+            self._tick(number, self.now())  # a bag holds each message at a time of its own
         return bool(numbers)
 
     def _tick(self, number: int, received: int) -> None:
@@ -402,7 +378,7 @@ class EstimatorNode(ManagedNode):
         self._sent.clear()
         self._state = receive(self._machine, self._state, plan, tick, received, self._send)
         commands = self._send_rest(received) if self._has_rest else []
-        self._recording.record(plan.topic, TICK_TYPE, received, encode(tick))
+        self.recording.record(plan.topic, TICK_TYPE, received, encode(tick))
         self._record_answers(commands)
 
     def fade_out(self) -> None:
@@ -416,7 +392,7 @@ class EstimatorNode(ManagedNode):
         while left:
             time.sleep(_STOP_PERIOD)
             for number in acting:
-                self._tick(number, self._now())
+                self._tick(number, self.now())
             self.publish_newest()
             left -= all(self._state.actuators[number].pipeline.feedforward.fade == 0.0 for number in acting)
 
@@ -446,24 +422,17 @@ class EstimatorNode(ManagedNode):
         def record(data: bytes, source: int, _: int) -> None:
             """Record one message."""
             if self.active:
-                received = self._now()
+                received = self.now()
                 sent = max(received - _lateness(source), 0)
-                self._recording.record(topic, type_name, received, data, sent)
+                self.recording.record(topic, type_name, received, data, sent)
 
-        self._recorded_only.append(
-            self.create_subscription(
-                message_class(type_name), topic, with_source_time(record), qos.best_effort(qos.STREAM), raw=True
-            )
-        )
+        kind, callback, profile = message_class(type_name), with_source_time(record), qos.best_effort(qos.STREAM)
+        self._recorded_only.append(self.create_subscription(kind, topic, callback, profile, raw=True))
 
     def _on_message(self, name: str, data: bytes, source: int, received: int) -> None:
         """Take a message that was sent at ``source`` [ns, system clock], and those that wait behind a late one.
 
-        Args:
-            name: Input.
-            data: Bytes.
-            source: When it was sent [ns of the system clock]; 0: not known.
-            received: When the middleware received it [ns].
+        A ``source`` of 0 is not known. The middleware received the message at ``received`` [ns].
         """
         lateness, now = time.time_ns() - source if source else 0, time.perf_counter_ns()
         if lateness > _BACKLOG:
@@ -498,16 +467,13 @@ class EstimatorNode(ManagedNode):
         Only an active node answers, so the publisher is none of the life cycle, and the bytes go past the checks of
         `Publisher.publish`: both take time.
         """
-        publisher = self._outputs[key] = self.create_publisher(
-            message_class(type_name),
-            topic,
-            qos.STREAM,
-            qos_overriding_options=qos.overridable(),
-            event_callbacks=PublisherEventCallbacks(
-                incompatible_qos=partial(self._watch.on_incompatible_subscriber, key)
-            ),
-        )
-        self._publish[key] = publisher.handle.publish_raw
+        kind, note = message_class(type_name), partial(self._watch.on_incompatible_subscriber, key)
+        options = {
+            'qos_overriding_options': qos.overridable(),
+            'event_callbacks': PublisherEventCallbacks(incompatible_qos=note),
+        }
+        self._outputs[key] = self.create_publisher(kind, topic, qos.STREAM, **options)
+        self._publish[key] = self._outputs[key].handle.publish_raw
 
     def _on_watchdog_timer(self) -> None:
         """Let the watchdog act; every `_TICK_PERIOD` while it has to or somebody looks on, else seldom.
@@ -528,11 +494,7 @@ class EstimatorNode(ManagedNode):
             self._look_at_graph()
 
     def _look_after_timers(self, now: int) -> None:
-        """Call what is overdue, if the watchdog was not called for long; after a message, at ``now`` [ns].
-
-        Args:
-            now: Of `time.perf_counter_ns`.
-        """
+        """Call what is overdue at ``now`` [ns of `time.perf_counter_ns`], if the watchdog was not called for long."""
         if now - self._watchdog_called > _STARVED:
             self.call_overdue_timers()
 
@@ -610,14 +572,7 @@ class EstimatorNode(ManagedNode):
         return any(one.configuration.has_placeholder for one in actuators if prefix.startswith(_prefix(one.name)))
 
     def check_change(self, changed: Mapping[ParameterGroup, Any]) -> None:
-        """Reject a force from placeholder seals.
-
-        Args:
-            changed: Record of each group with a changed parameter.
-
-        Raises:
-            ValueError: The change is invalid.
-        """
+        """Reject a force from placeholder seals, by a ValueError."""
         for group, record in changed.items():
             if isinstance(record, FeedForwardSettings) and record.scale > 0.0 and self._has_placeholder(group.prefix):
                 raise ValueError(f'{group.prefix}scale = {record.scale}: {PLACEHOLDER_WARNING}')
@@ -632,13 +587,13 @@ class EstimatorNode(ManagedNode):
         self.has_viewer = self._outputs[_MONITOR].get_subscription_count() > 0
         if self._watch.has_changed():
             self.publish_diagnostics()
-        if following := self._recording.continue_in_next_bag():
+        if following := self.recording.continue_in_next_bag():
             self.publish_configuration()
             self.get_logger().info(f'recording to {following}')
-        if self.active and self._mapping is None and self._recording.is_state_due(time.monotonic()):
-            self._recording.record(self._state_topic, STATE_TYPE, self._now(), encode_text(self._snapshot()))
+        if self.active and self._mapping is None and self.recording.is_state_due(time.monotonic()):
+            self.recording.record(self._state_topic, STATE_TYPE, self.now(), encode_text(self._snapshot()))
         if self.active and CLOCK_TOPIC not in self._inputs:
-            self._follow_clock(time.time_ns() - self._now())
+            self._follow_clock(time.time_ns() - self.now())
 
     def _on_input_timer(self) -> None:
         """Say what the node waits for, which input has stopped, and which is back."""
@@ -658,7 +613,7 @@ class EstimatorNode(ManagedNode):
             self._set(clock_offset=offset)
             self.publish_configuration()
 
-    def _now(self) -> int:
+    def now(self) -> int:
         """Time of receipt [ns]: the clock as it was at activation. It goes on whatever clocks and simulated time do."""
         return time.monotonic_ns() + self._receipt_offset
 
@@ -671,12 +626,12 @@ class EstimatorNode(ManagedNode):
     def publish_recorded(self, key: Any, type_name: str, data: bytes) -> None:
         """Publish a message by the publisher ``key``, and record it."""
         self._outputs[key].publish(data)
-        self._recording.record(self._topics[key], type_name, self._now(), data)
+        self.recording.record(self._topics[key], type_name, self.now(), data)
 
     def _start_recording(self) -> tuple[bool, str]:
         """Start a bag, which begins with a snapshot; success, and the folder of the bag or the error."""
         try:
-            path = self._recording.start(self.settings(RecordingOptions))
+            path = self.recording.start(self.settings(RecordingOptions))
         except ValueError as error:
             self._log_error_once('recorder', str(error))
             self.publish_configuration()
@@ -687,8 +642,8 @@ class EstimatorNode(ManagedNode):
 
     def _stop_recording(self) -> tuple[bool, str]:
         """Finish the bag in the background; success, and its path and counts or the error."""
-        outcome = self._recording.stop()
-        return bool(outcome) and not self._recording.failure, outcome or 'not recording'
+        outcome = self.recording.stop()
+        return bool(outcome) and not self.recording.failure, outcome or 'not recording'
 
     def _reset_adaptation(self) -> tuple[bool, str]:
         """Forget what the adaptation of every actuator has learnt."""
@@ -736,12 +691,8 @@ class EstimatorNode(ManagedNode):
 
     def _arrived(self) -> Mapping[str, int]:
         """Messages of each input; none of one whose messages never had the numbers that an actuator wants."""
-        numbers = range(len(self._machine.actuators))
-        lacking = {
-            topic
-            for topic, data in self._newest.items()
-            if any(missing(self._machine, number, topic, data) for number in numbers)
-        }
+        numbers, newest = range(len(self._machine.actuators)), self._newest.items()
+        lacking = {t for t, data in newest if any(missing(self._machine, number, t, data) for number in numbers)}
         self._complete |= self._newest.keys() - lacking
         never = lacking - self._complete
         counts = {topic: count for one in self._statistics.values() for topic, count in one.received.items()}
@@ -772,7 +723,7 @@ class EstimatorNode(ManagedNode):
 
     def _report_graph(self, graph: GraphFindings) -> DiagnosticStatus:
         """Log what is new about the graph and the recorder; status of the recorder."""
-        recorder = self._recording.report()
+        recorder = self.recording.report()
         self._log_error_once('publishers', '; '.join(graph.duplicates))
         self._log_error_once('unheard', '; '.join(graph.unheard))
         self._log_error_once('recorder', recorder.message if recorder.level == DiagnosticStatus.ERROR else '')
@@ -786,7 +737,7 @@ class EstimatorNode(ManagedNode):
 
     def _is_refused(self, duplicates: list[str]) -> bool:
         """Whether the inputs are rejected, since these topics have several publishers."""
-        return bool(duplicates) and self.settings(InputOptions).refuse_second_publisher
+        return bool(duplicates) and self.settings(node_options.InputOptions).refuse_second_publisher
 
 
 def _prefix(actuator: str) -> str:
@@ -800,7 +751,7 @@ def _groups(actuator: Actuator) -> tuple[ParameterGroup, ...]:
     return (
         ParameterGroup(EstimatorSettings, name, defaults=actuator.settings),
         ParameterGroup(FeedForwardSettings, name + FEEDFORWARD_PREFIX, defaults=actuator.feedforward),
-        ParameterGroup(AdaptationSettings, name + ADAPTATION_PREFIX, defaults=actuator.adaptation),
+        ParameterGroup(AdaptationSettings, name + node_options.ADAPTATION_PREFIX, defaults=actuator.adaptation),
     )
 
 

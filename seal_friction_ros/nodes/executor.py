@@ -41,16 +41,13 @@ def run(
     stop: Callable[[AnyNode], None],
     args: list[str] | None = None,
 ) -> int:
-    """Create, start and spin a node; on SIGINT or SIGTERM stop it between two callbacks.
+    """Create, start and spin a node; on SIGINT or SIGTERM stop it between two callbacks. Exit code 2: no start.
 
     Args:
         make_node: Creates the node; its ValueError ends the process with one line.
         start: Called with the node before spinning; False if the node could not start and logged the reason.
         stop: Called with the node at the end, also after an error.
         args: Command line with ``--ros-args``.
-
-    Returns:
-        Exit code: 0, or 2 for a node that could not start.
     """
     # A thread waits for the signals. The handler of ROS would shut the context down during a callback that publishes;
     # the handler of Python would wait until the executor returns from C++.

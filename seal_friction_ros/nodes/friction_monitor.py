@@ -11,7 +11,7 @@ import os
 import queue
 import sys
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Future
 from functools import partial
 from pathlib import Path
@@ -25,13 +25,12 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.utilities import remove_ros_args
 
-from seal_friction_ros.core.messages.definitions import Definition, full_name, parse_definition
 from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, NEWEST_TYPE
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.executor import run
 from seal_friction_ros.nodes.managed_node import message_class
 from seal_friction_ros.nodes.subscription import taken
-from seal_friction_ros.offline.bags.definitions import message_definition
+from seal_friction_ros.offline.bags.definitions import installed_definitions
 from seal_friction_ros.offline.monitor.live_view import RATE, LiveView, Wanted
 from seal_friction_ros.offline.monitor.node_view import NodeView
 from seal_friction_ros.offline.monitor.off_latch import ANSWER_TIMEOUT, Answer
@@ -61,11 +60,7 @@ class _Asked(NamedTuple):
 
 
 class FrictionMonitor(Node):
-    """Feeds a `LiveView`.
-
-    Args:
-        allow_changes: Whether the page may change parameters of the feed-forward.
-    """
+    """Feeds a `LiveView`, whose page may change parameters of the feed-forward if it is told so."""
 
     def __init__(self, allow_changes: bool = False, **kwargs: Any) -> None:
         quiet = {'enable_rosout': False, 'start_parameter_services': False}
@@ -107,17 +102,17 @@ class FrictionMonitor(Node):
         for topic, types in self.get_topic_names_and_types():
             node = topic.removesuffix(_CONFIGURATION)
             if types == [CONFIGURATION_TYPE] and node != topic and node not in self._nodes:
-                self._nodes[node] = NodeView(node, _definitions)
+                self._nodes[node] = NodeView(node, installed_definitions)
                 self._nodes[node].hear(self._received())
                 self.view.add(self._nodes[node])
-                self._configurations[node] = self._listener.create_subscription(
-                    message_class(CONFIGURATION_TYPE), topic, _never_called, qos.LATCHED, raw=True
-                )
-                self._newest[node] = self._listener.create_subscription(
-                    message_class(NEWEST_TYPE), node + _NEWEST, _never_called, _FEW, raw=True
-                )
+                self._configurations[node] = self._listened(CONFIGURATION_TYPE, topic, qos.LATCHED)
+                self._newest[node] = self._listened(NEWEST_TYPE, node + _NEWEST, _FEW)
                 if self._allow_changes:
                     self._clients_of(node)  # so that they are found before somebody presses OFF
+
+    def _listened(self, type_name: str, topic: str, profile: QoSProfile) -> Any:
+        """Subscription whose messages are taken."""
+        return self._listener.create_subscription(message_class(type_name), topic, lambda _: None, profile, raw=True)
 
     def _on_diagnostics(self, array: DiagnosticArray) -> None:
         with self.view.lock:
@@ -193,10 +188,8 @@ class FrictionMonitor(Node):
     def _clients_of(self, node: str) -> tuple[Any, Any]:
         """Clients of a node that set and read parameters."""
         if node not in self._clients_by_node:
-            self._clients_by_node[node] = (
-                self.create_client(SetParametersAtomically, f'{node}/set_parameters_atomically'),
-                self.create_client(GetParameters, f'{node}/get_parameters'),
-            )
+            setter = self.create_client(SetParametersAtomically, f'{node}/set_parameters_atomically')
+            self._clients_by_node[node] = setter, self.create_client(GetParameters, f'{node}/get_parameters')
         return self._clients_by_node[node]
 
     def _on_set(self, asked: _Asked, future: Any) -> None:
@@ -212,26 +205,15 @@ class FrictionMonitor(Node):
         values = dict(zip(asked.values, (value.double_value for value in future.result().values), strict=False))
         shown = ', '.join(f'{name} = {value:g}' for name, value in values.items())
         at = time.strftime('%H:%M:%S')
-        if values != asked.values:
-            asked.answer.set_result(
-                Answer(False, f'NOT CONFIRMED by {asked.node}: it has {shown or "no such parameter"}')
-            )
-            return
         word = 'OFF' if _is_off(values) else 'changed'
-        asked.answer.set_result(Answer(True, f'{word}: confirmed by {asked.node} at {at}: {shown}'))
+        answer = Answer(True, f'{word}: confirmed by {asked.node} at {at}: {shown}')
+        if values != asked.values:
+            answer = Answer(False, f'NOT CONFIRMED by {asked.node}: it has {shown or "no such parameter"}')
+        asked.answer.set_result(answer)
 
 
 def _is_off(values: Mapping[str, float]) -> bool:
     return all(name.endswith('scale') and value == 0.0 for name, value in values.items())
-
-
-def _definitions(types: Iterable[str]) -> Mapping[str, Definition]:
-    """Definitions of installed message types."""
-    return {kind: parse_definition(kind, message_definition(full_name(kind))[0]) for kind in types}
-
-
-def _never_called(_data: bytes) -> None:
-    """Callback of a subscription whose messages are taken."""
 
 
 def main() -> int:

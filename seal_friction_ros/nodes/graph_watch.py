@@ -56,11 +56,9 @@ class GraphWatch:
         self._other_definitions: list[str] = []
 
     def findings(self, silent_inputs: list[str], *, retry: bool) -> GraphFindings:
-        """State of the graph.
+        """State of the graph, with the inputs without recent messages.
 
-        Args:
-            silent_inputs: Inputs without recent messages.
-            retry: Whether to subscribe again to silent inputs whose publishers offer best effort only.
+        ``retry``: subscribe again to those whose publishers offer best effort only.
         """
         counts = {name: self._publisher_count(name) for name in self._input_types}
         duplicates = self.duplicate_publishers()
@@ -103,13 +101,11 @@ class GraphWatch:
         """Nodes with another definition of a message; looked up only after a change of the graph, as it takes 1 ms."""
         types = {self._inputs[name].topic_name: type_name for name, type_name in self._input_types.items()}
         types |= {self._outputs[key].topic_name: type_name for key, type_name in self._output_types.items()}
-        counts = [
-            count(topic) for topic in types for count in (self._node.count_publishers, self._node.count_subscribers)
-        ]
+        both = self._node.count_publishers, self._node.count_subscribers
+        counts = [count(topic) for topic in types for count in both]
         if counts != self._endpoint_counts:
-            endpoints = {
-                topic: [*self._find(topic), *self._node.get_subscriptions_info_by_topic(topic)] for topic in types
-            }
+            subscribers = self._node.get_subscriptions_info_by_topic
+            endpoints = {topic: [*self._find(topic), *subscribers(topic)] for topic in types}
             me = self._node.get_fully_qualified_name()
             found = [other_definitions(topic, types[topic], endpoints[topic], me) for topic in types]
             self._other_definitions = [text for texts in found for text in texts]

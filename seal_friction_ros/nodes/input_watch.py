@@ -50,11 +50,9 @@ class InputWatch:
         self._looked = started
 
     def look(self, received: Mapping[str, int], now: float) -> list[Remark]:
-        """What is new, to be called every half a second or so.
+        """What is new, to be called every half a second or so, ``now`` [s] on the clock of ``started``.
 
-        Args:
-            received: Number of messages of each input since the start.
-            now: Time [s] on the clock of ``started``.
+        ``received``: number of messages of each input since the start.
         """
         remarks = [remark for name, count in received.items() for remark in self._look_at(name, count, now)]
         self._looked = now
@@ -81,6 +79,5 @@ class InputWatch:
         if known.stopped or now - known.changed <= known.longest_gap:
             return []
         self._known[name] = known._replace(stopped=True)
-        return [
-            Remark(f'{name} has stopped: no message for {now - known.changed:.1f} s; {self._publishers(name)}', True)
-        ]
+        text = f'{name} has stopped: no message for {now - known.changed:.1f} s; {self._publishers(name)}'
+        return [Remark(text, True)]

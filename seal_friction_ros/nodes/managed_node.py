@@ -29,11 +29,7 @@ _SIMILAR = 0.8  # [-] of `difflib`; our choice
 
 
 def message_class(type_name: str) -> Any:
-    """Python class of a message, from its full type name.
-
-    Raises:
-        ValueError: The type is not installed.
-    """
+    """Python class of a message, from its full type name; ValueError if the type is not installed."""
     package, _, name = type_name.partition('/msg/')
     try:
         return getattr(import_module(f'{package}.msg'), name)
@@ -131,8 +127,7 @@ class ManagedNode(LifecycleNode):
     def make(self) -> None:
         """Create everything that the node needs while it is configured.
 
-        Raises:
-            Exception: The creation failed: the node logs the error and stays unconfigured.
+        If it raises, the node logs the error and stays unconfigured.
         """
 
     def release(self) -> None:
@@ -152,14 +147,7 @@ class ManagedNode(LifecycleNode):
         """Start a new counting interval; called once a second after the diagnostics."""
 
     def check_change(self, changed: Mapping[ParameterGroup, Any]) -> None:
-        """Reject changed records that contradict other parameters.
-
-        Args:
-            changed: Record of each group with a changed parameter.
-
-        Raises:
-            ValueError: The change is invalid.
-        """
+        """Reject changed records, by group, that contradict other parameters, by a ValueError."""
 
     def on_change(self, changed: Collection[Parameter]) -> None:
         """Apply changed parameters; called while the node is configured."""
@@ -169,10 +157,7 @@ class ManagedNode(LifecycleNode):
     def settings(self, record_type: type[Record], prefix: str | None = None, **changed: Any) -> Record:
         """The dataclass made from the present parameters; ``changed`` overrides fields.
 
-        Without a ``prefix`` it is that of the first group of the type.
-
-        Raises:
-            ValueError: A value is invalid.
+        ValueError if a value is invalid. Without a ``prefix`` it is that of the first group of the type.
         """
         found = (group.prefix for group in self._groups if group.record_type is record_type)
         return read(self, record_type, next(found) if prefix is None else prefix, **changed)
@@ -181,22 +166,18 @@ class ManagedNode(LifecycleNode):
         """Accept or reject a set of changes as a whole."""
         values = {p.name: p.value for p in parameters}
         made: dict[ParameterGroup, Any] = {}
-        for group in self._groups:
-            names = {name: field for name, field in group.names().items() if name in values}
-            fixed = sorted(names.keys() & group.fixed())
-            if fixed and self.configured:
-                reason = f'{", ".join(fixed)}: can only change while the node is unconfigured; clean it up first'
-                return SetParametersResult(successful=False, reason=reason)
-            if not names:
-                continue
-            try:
-                changed = {field: values[name] for name, field in names.items()}
-                made[group] = self.settings(group.record_type, group.prefix, **changed)
-            except (ValueError, TypeError) as error:
-                return SetParametersResult(successful=False, reason=str(error))
         try:
+            for group in self._groups:
+                names = {name: field for name, field in group.names().items() if name in values}
+                fixed = sorted(names.keys() & group.fixed())
+                if fixed and self.configured:
+                    what = 'can only change while the node is unconfigured; clean it up first'
+                    raise ValueError(f'{", ".join(fixed)}: {what}')
+                if names:
+                    changed = {field: values[name] for name, field in names.items()}
+                    made[group] = self.settings(group.record_type, group.prefix, **changed)
             self.check_change(made)
-        except ValueError as error:
+        except (ValueError, TypeError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 

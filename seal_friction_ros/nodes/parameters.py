@@ -16,8 +16,7 @@ Record = TypeVar('Record')
 def declare(node: Node, group: ParameterGroup) -> None:
     """Declare the parameters of a group; a number may be given as a whole number.
 
-    Raises:
-        rclpy.exceptions.ParameterException: An override has the wrong type or is out of bounds.
+    rclpy.exceptions.ParameterException: an override has the wrong type or is out of bounds.
     """
     defaults = {field.name: field.default for field in dataclasses.fields(group.record_type)}
     if group.defaults is not None:
@@ -54,8 +53,7 @@ def with_declared_type(parameter: Parameter, numbers: set[str]) -> Parameter:
 def read(node: Node, record_type: type[Record], prefix: str = '', **changed: Any) -> Record:
     """Make the dataclass from the parameters of the node; ``changed`` overrides fields.
 
-    Raises:
-        ValueError: A value is invalid; one line that names field, value and bound.
+    ValueError, in one line that names field, value and bound: a value is invalid.
     """
     try:
         values = {name: changed.get(name, node.get_parameter(prefix + name).value) for name in meanings(record_type)}

@@ -6,13 +6,9 @@ from pathlib import Path
 
 
 def take_realtime_priority(priority: int) -> None:
-    """Schedule every present and future thread of this process with SCHED_FIFO.
+    """Schedule every present and future thread of this process with SCHED_FIFO, 1 (lowest) to 99; 0 changes nothing.
 
-    Args:
-        priority: 1 (lowest) to 99; 0 changes nothing.
-
-    Raises:
-        ValueError: The system does not grant the priority.
+    ValueError: the system does not grant the priority.
     """
     if not priority:
         return
@@ -20,10 +16,9 @@ def take_realtime_priority(priority: int) -> None:
         for thread in Path('/proc/self/task').iterdir():
             os.sched_setscheduler(int(thread.name), os.SCHED_FIFO, os.sched_param(priority))
     except (OSError, AttributeError) as error:
-        raise ValueError(
-            f'realtime_priority = {priority} is not granted: {error}: give the user an rtprio limit of {priority} '
-            '(/etc/security/limits.conf) or the process CAP_SYS_NICE, or set realtime_priority to 0'
-        ) from None
+        hint = f'give the user an rtprio limit of {priority} (/etc/security/limits.conf) or the process CAP_SYS_NICE'
+        reason = f'realtime_priority = {priority} is not granted: {error}'
+        raise ValueError(f'{reason}: {hint}, or set realtime_priority to 0') from None
 
 
 def realtime_granted() -> bool:

@@ -11,15 +11,11 @@ from seal_friction_ros.offline.bags.recorder import Recorder
 
 
 class Recording:
-    """The present bag, if any, and the bags that are being finished.
-
-    Args:
-        owner: Full name of the node.
-    """
+    """The present bag of the node ``owner``, if any, and the bags that are being finished."""
 
     def __init__(self, owner: str = '') -> None:
         self._owner = owner
-        self._recorder: Recorder | None = None
+        self.recorder: Recorder | None = None
         self._finishing: list[Recorder] = []
         self._state_period = 0.0  # [s] 0.0: no states amid the bag
         self._next_state = 0.0  # [s] of the steady clock; 0.0: not known
@@ -29,18 +25,17 @@ class Recording:
     def start(self, options: RecordingOptions) -> Path:
         """Start a bag named ``record_name``, or after the present time if that is empty; return its folder.
 
-        Raises:
-            BagError: The bag cannot be created, or another bag is being recorded, or the disk has no room: then the
-                recording begins once there is room.
+        BagError: the bag cannot be created, or another bag is being recorded, or the disk has no room: then the
+        recording begins once there is room.
         """
-        if self._recorder is not None and not self._recorder.error:
-            raise BagError(f'recording to {self._recorder.path} already: stop that first')
+        if self.recorder is not None and not self.recorder.error:
+            raise BagError(f'recording to {self.recorder.path} already: stop that first')
         self.stop()
         self._state_period, self._next_state = options.record_state_period, 0.0
         directory, name = options.record_directory, options.record_name
         try:
             folder = Path(directory).expanduser()
-            self._recorder = Recorder(
+            self.recorder = Recorder(
                 folder / (name or timed_name('friction')),
                 split_size=options.record_split_size,
                 split_duration=options.record_split_duration,
@@ -52,19 +47,19 @@ class Recording:
             self.failure = f'record_directory = {directory!r}, record_name = {name!r}: {error}'
             raise BagError(self.failure) from None
         self.failure = ''
-        if self._recorder.error:
-            raise BagError(self._recorder.error)
-        return self._recorder.path
+        if self.recorder.error:
+            raise BagError(self.recorder.error)
+        return self.recorder.path
 
     def continue_in_next_bag(self) -> Path | None:
         """Begin the next bag if it is due; its folder. The caller has to record a snapshot first."""
-        if self._recorder is None or not self._recorder.is_next_due:
+        if self.recorder is None or not self.recorder.is_next_due:
             return None
-        return self._recorder.begin_next()
+        return self.recorder.begin_next()
 
     def is_state_due(self, now: float) -> bool:
         """Whether to record a state ``now`` [s of the steady clock]; once for each period since the bag began."""
-        if self._recorder is None or self._recorder.error or not self._state_period:
+        if self.recorder is None or self.recorder.error or not self._state_period:
             return False
         is_due = 0.0 < self._next_state <= now
         if is_due or not self._next_state:
@@ -73,21 +68,20 @@ class Recording:
 
     def record(self, topic: str, type_name: str, log_time: int, data: bytes, publish_time: int | None = None) -> None:
         """Record one message, if a bag is being recorded."""
-        if self._recorder is not None:
-            self._recorder.record(topic, type_name, log_time, data, publish_time)
+        if self.recorder is not None:
+            self.recorder.record(topic, type_name, log_time, data, publish_time)
 
     def flush_if_idle(self) -> None:
         """Let the recorder write now, right after an answer."""
-        if self._recorder is not None:
-            self._recorder.flush_if_idle()
+        if self.recorder is not None:
+            self.recorder.flush_if_idle()
 
     def stop(self) -> str:
         """Finish the bag in the background, so that the disk does not delay the estimate.
 
-        Returns:
-            Path and message counts, or the error; empty if no bag was being recorded.
+        Path and message counts, or the error; empty if no bag was being recorded.
         """
-        recorder, self._recorder = self._recorder, None
+        recorder, self.recorder = self.recorder, None
         self.failure = ''
         if recorder is None:
             return ''
@@ -100,7 +94,7 @@ class Recording:
 
     def close(self) -> str:
         """Finish the bag and wait for the disk; path and message counts or the error, empty if there was no bag."""
-        recorder = self._recorder
+        recorder = self.recorder
         self.stop()
         for finishing in self._finishing:
             finishing.close()
@@ -119,9 +113,9 @@ class Recording:
         """Status of the recorder."""
         self._forget_finished()
         level, message, values, failure = DiagnosticStatus.OK, 'not recording', {}, self.failure
-        recorder = self._recorder or next(iter(self._finishing), None)
+        recorder = self.recorder or next(iter(self._finishing), None)
         if recorder is not None:
-            message = 'recording' if recorder is self._recorder else 'writing the end of a bag'
+            message = 'recording' if recorder is self.recorder else 'writing the end of a bag'
             failure = recorder.error or failure
             names = ('written', 'waiting', 'dropped')
             values = {'bag': recorder.path, **{name: getattr(recorder, name) for name in names}}

@@ -5,11 +5,12 @@ import sys
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock as ClockMessage
 
@@ -20,24 +21,18 @@ from seal_friction_ros.core.friction.force_sum_correction import NO_CORRECTION, 
 from seal_friction_ros.core.messages.coder import decode, encode
 from seal_friction_ros.core.messages.layouts import FEEDFORWARD_TYPE, INPUTS, REFERENCE_TYPE
 from seal_friction_ros.core.messages.records import FeedForward, Force, Position, Pressure, ServoReference, Velocity
+from seal_friction_ros.core.servo import simulator_options
 from seal_friction_ros.core.servo.controller import Limited
 from seal_friction_ros.core.servo.cylinder import pressure_force
 from seal_friction_ros.core.servo.motions import PullTest, RoundedWave, Setpoint, Wave
 from seal_friction_ros.core.servo.position_servo import ServoParameters, init, outputs, step
 from seal_friction_ros.core.servo.pull_rig import PullRig, init_pull_rig, pull_rig, step_pull_rig
 from seal_friction_ros.core.servo.sensors import Readings, SensorSettings, read
-from seal_friction_ros.core.servo.simulator_options import (
-    PLANT,
-    SERVO_SIMULATOR_PARAMETERS,
-    WAVES,
-    SimulatorSettings,
-    StandardMessages,
-    servo_parameters,
-)
+from seal_friction_ros.core.servo.simulator_options import PLANT, WAVES, SimulatorSettings, StandardMessages
 from seal_friction_ros.files import load_seals
 from seal_friction_ros.nodes import qos, standard_messages
 from seal_friction_ros.nodes.executor import run
-from seal_friction_ros.nodes.managed_node import ManagedNode, message_class
+from seal_friction_ros.nodes.managed_node import ManagedNode, message_class, status_of
 
 FRAME = b'rod'
 _OUTPUTS = ('cylinder_pressure', 'force_sum', 'servo_reference', 'rod_position', 'rod_velocity')  # velocity last
@@ -60,7 +55,7 @@ class ServoSimulator(ManagedNode):
         self._thread: threading.Thread | None = None
         self._running = False
         self._inputs: list[Any] = []
-        super().__init__('servo_simulator', SERVO_SIMULATOR_PARAMETERS, **kwargs)
+        super().__init__('servo_simulator', simulator_options.SERVO_SIMULATOR_PARAMETERS, **kwargs)
 
     # --- lifecycle ---
 
@@ -72,10 +67,10 @@ class ServoSimulator(ManagedNode):
         self._period = round(_SECOND / self._settings.rate)
         self._make_servo()
         self._joint = self.settings(StandardMessages).joint
+        options = qos.overridable()
         for topic, kind in self._outputs_by_topic().items():
-            self._sensor_publishers[topic] = self.create_lifecycle_publisher(
-                kind, topic, qos.STREAM, qos_overriding_options=qos.overridable()
-            )
+            publisher = self.create_lifecycle_publisher(kind, topic, qos.STREAM, qos_overriding_options=options)
+            self._sensor_publishers[topic] = publisher
         if self._settings.publish_clock:
             self._clock_publisher = self.create_publisher(ClockMessage, '/clock', qos.CLOCK)
         if self._settings.feedforward_message == 'own':
@@ -96,10 +91,8 @@ class ServoSimulator(ManagedNode):
         return own
 
     def _subscribe(self, topic: str, kind: Any, callback: Any, raw: bool = True) -> None:
-        options = qos.overridable()
-        self._inputs.append(
-            self.create_subscription(kind, topic, callback, qos.STREAM, raw=raw, qos_overriding_options=options)
-        )
+        options = {'raw': raw, 'qos_overriding_options': qos.overridable()}
+        self._inputs.append(self.create_subscription(kind, topic, callback, qos.STREAM, **options))
 
     def _make_servo(self) -> None:
         period = 1.0 / self._settings.rate
@@ -117,7 +110,7 @@ class ServoSimulator(ManagedNode):
     def _servo_parameters(self, changed: dict[type, Any] | None = None) -> ServoParameters:
         kinds = (SimulatorSettings, SealSelection, *PLANT.values())
         used = {kind: (changed or {}).get(kind) or self.settings(kind) for kind in kinds}
-        return servo_parameters(used[SimulatorSettings], used, load_seals(used[SealSelection]))
+        return simulator_options.servo_parameters(used[SimulatorSettings], used, load_seals(used[SealSelection]))
 
     def release(self) -> None:
         """Destroy publishers and subscriptions."""
@@ -134,7 +127,7 @@ class ServoSimulator(ManagedNode):
         """Put the rod at its start position, at rest, and start the simulation."""
         settings = self._settings
         self._apply_settings()
-        self._wave_start = self._index = 0  # [samples]
+        self._wave_start = self.ticks = 0  # [samples]
         self._origin = 0 if settings.publish_clock else self.get_clock().now().nanoseconds
         self._feedforward: FeedForward | None = None
         self._reference: ServoReference | None = None
@@ -167,11 +160,7 @@ class ServoSimulator(ManagedNode):
     # --- parameters ---
 
     def check_change(self, changed: Mapping[ParameterGroup, Any]) -> None:
-        """Reject an unstable or unphysical plant, and a wave that needs other topics than the present one.
-
-        Raises:
-            ValueError: The change is invalid.
-        """
+        """Reject, by a ValueError, an unstable or unphysical plant, and a wave that needs other topics."""
         records = {group.record_type: record for group, record in changed.items()}
         if not self.configured:
             if records.keys() & {SimulatorSettings, SealSelection, *PLANT.values()}:
@@ -186,7 +175,7 @@ class ServoSimulator(ManagedNode):
         del changed
         settings = self.settings(SimulatorSettings)
         if self.active and settings.wave != self._settings.wave:
-            self._wave_start = self._index
+            self._wave_start = self.ticks
         self._settings = settings
         self._apply_settings()
 
@@ -200,26 +189,26 @@ class ServoSimulator(ManagedNode):
     # --- inputs ---
 
     def _on_feedforward(self, data: bytes) -> None:
-        try:
+        with self._counting_malformed('friction_feedforward'):
             self._feedforward = decode(FEEDFORWARD_TYPE, data)
-        except ValueError as error:
-            self._malformed('friction_feedforward', error)
 
     def _on_effort(self, force: float | None) -> None:
         """Take the force of a standard message; it counts from its receipt."""
         if force is not None and self.active:
-            self._feedforward = FeedForward(self._origin + self._index * self._period, force, 0.0, 0)
+            self._feedforward = FeedForward(self._origin + self.ticks * self._period, force, 0.0, 0)
 
     def _on_reference(self, data: bytes) -> None:
-        try:
+        with self._counting_malformed('servo_reference'):
             self._reference = decode(REFERENCE_TYPE, data)
-        except ValueError as error:
-            self._malformed('servo_reference', error)
 
-    def _malformed(self, topic: str, error: ValueError) -> None:
-        if self.active:
-            self._recent[f'{topic} malformed'] += 1
-            self.get_logger().error(f'{topic}: {error}', throttle_duration_sec=1.0)
+    @contextmanager
+    def _counting_malformed(self, topic: str) -> Iterator[None]:
+        try:
+            yield
+        except ValueError as error:
+            if self.active:
+                self._recent[f'{topic} malformed'] += 1
+                self.get_logger().error(f'{topic}: {error}', throttle_duration_sec=1.0)
 
     # --- simulation ---
 
@@ -252,7 +241,7 @@ class ServoSimulator(ManagedNode):
 
     def _tick(self) -> None:
         """Publish the present sample; then simulate controller and plant until the next sample."""
-        stamp = self._origin + self._index * self._period
+        stamp = self._origin + self.ticks * self._period
         reference = self._reference_at(stamp)
         true, limited = self._outputs, 0
         pressures = true.pressure_a, true.pressure_b
@@ -260,7 +249,7 @@ class ServoSimulator(ManagedNode):
         if self._settings.messages == 'standard':  # a load cell: everything on the rod but pressures and seals
             force_sum = true.force_sum - pressure_force(self._servo.cylinder, *pressures)
         readings = Readings(pressures, true.velocity, force_sum, true.position)
-        self._delayed.append((stamp, read(self._sensors, self._index, readings)))
+        self._delayed.append((stamp, read(self._sensors, self.ticks, readings)))
         if self._clock_publisher is not None:
             seconds, nanoseconds = divmod(stamp, _SECOND)
             self._clock_publisher.publish(ClockMessage(clock=Time(sec=seconds, nanosec=nanoseconds)))
@@ -268,19 +257,19 @@ class ServoSimulator(ManagedNode):
         while len(self._delayed) > self._delay:
             self._publish(*self._delayed.popleft())
         if self._rig is not None:
-            time_now = self._index * self._period * 1e-9
+            time_now = self.ticks * self._period * 1e-9
             self._rig_state, self._outputs = step_pull_rig(self._rig, self._rig_state, time_now)
         elif reference is not None:
             self._state, self._outputs = step(self._servo, self._state, reference, self._feedforward_at(stamp))
             limited = self._outputs.command.limited
         if limited:
             self._recent.update(f'limited {bit.name}' for bit in Limited if limited & bit)
-        self._index += 1
+        self.ticks += 1
 
     def _reference_at(self, stamp: int) -> Setpoint | None:
         """Reference at ``stamp`` [ns]; None on the pull rig."""
         if self._wave is not None:
-            return self._wave.at((self._index - self._wave_start) * self._period * 1e-9)
+            return self._wave.at((self.ticks - self._wave_start) * self._period * 1e-9)
         if self._rig is not None:
             return None
         newest = self._reference
@@ -312,53 +301,51 @@ class ServoSimulator(ManagedNode):
             self._sensor_publishers['servo_reference'].publish(data)
 
     def _publish(self, stamp: int, readings: Readings) -> None:
-        send = self._sensor_publishers
+        messages: dict[str, Any] = {}
         if self._settings.messages == 'standard':
-            options = self.settings(StandardMessages)
-            for topic, message in standard_messages.sensor_messages(stamp, readings, options).items():
-                send[topic].publish(message)
-            return
-        if readings.pressure is not None:
-            send['cylinder_pressure'].publish(encode(Pressure(stamp, *readings.pressure), FRAME))
-        if readings.force_sum is not None:
-            send['force_sum'].publish(encode(Force(stamp, readings.force_sum), FRAME))
-        if readings.position is not None:
-            send['rod_position'].publish(encode(Position(stamp, readings.position), FRAME))
-        if readings.velocity is not None:
-            send['rod_velocity'].publish(encode(Velocity(stamp, readings.velocity, FRAME)))
+            messages = standard_messages.sensor_messages(stamp, readings, self.settings(StandardMessages))
+        else:
+            if readings.pressure is not None:
+                messages['cylinder_pressure'] = encode(Pressure(stamp, *readings.pressure), FRAME)
+            if readings.force_sum is not None:
+                messages['force_sum'] = encode(Force(stamp, readings.force_sum), FRAME)
+            if readings.position is not None:
+                messages['rod_position'] = encode(Position(stamp, readings.position), FRAME)
+            if readings.velocity is not None:
+                messages['rod_velocity'] = encode(Velocity(stamp, readings.velocity, FRAME))
+        for topic, message in messages.items():
+            self._sensor_publishers[topic].publish(message)
 
     # --- diagnostics ---
 
     def diagnostics(self) -> dict[str, DiagnosticStatus]:
         """Pace of the simulation, and counts of faulty references and feed-forwards."""
-        status = DiagnosticStatus(level=DiagnosticStatus.OK, message='simulating')
         if not self.active:
-            status.message = 'inactive'
-            return {'simulator': status}
-        (before, first), (now, index) = self._reported, (time.monotonic(), self._index)
+            return {'simulator': status_of(DiagnosticStatus.OK, 'inactive')}
+        (before, first), (now, index) = self._reported, (time.monotonic(), self.ticks)
         self._reported = now, index
         seconds = max(now - before, 1e-3)
         rate = (index - first) / seconds
         load = (time.process_time() - self._started[1]) / max(now - self._started[0], 1e-3)
         recent, self._recent = self._recent, Counter()
         self._counts += recent
+        level, message = DiagnosticStatus.OK, 'simulating'
         if self._failure:
-            status.level, status.message = DiagnosticStatus.ERROR, self._failure
+            level, message = DiagnosticStatus.ERROR, self._failure
         elif any(not name.endswith(_NORMAL_LIMITS) for name in recent):
-            status.level = DiagnosticStatus.WARN
-            status.message = ', '.join(f'{count} {name}' for name, count in sorted(recent.items()))
+            level = DiagnosticStatus.WARN
+            message = ', '.join(f'{count} {name}' for name, count in sorted(recent.items()))
         force = self._feedforward.force if self._feedforward is not None else math.nan
         values = {
             'rate [Hz]': f'{rate:.1f}',
             'time factor': f'{rate * self._period * 1e-9:.3f}',
             'share of a core [%]': f'{100.0 * load:.1f}',
-            'ticks': str(self._index),
-            'missed ticks': '0',
+            'ticks': self.ticks,
+            'missed ticks': 0,
             'feed-forward [N]': f'{force:.3f}',
-            **{name: str(count) for name, count in sorted(self._counts.items())},
+            **dict(sorted(self._counts.items())),
         }
-        status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
-        return {'simulator': status}
+        return {'simulator': status_of(level, message, values)}
 
 
 def main() -> int:

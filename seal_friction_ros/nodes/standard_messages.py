@@ -43,10 +43,8 @@ def reference_messages(stamp: int, reference: Setpoint, joint: str) -> dict[str,
     position, velocity, acceleration = map(float, reference)
     state = JointState(name=[joint], position=[position], velocity=[velocity])
     state.header.stamp = _time(stamp)
-    point = JointTrajectoryPoint(
-        positions=[position], velocities=[velocity], accelerations=[acceleration], time_from_start=Duration()
-    )
-    return {'joint_reference': state, 'reference_point': point}
+    motion = {'positions': [position], 'velocities': [velocity], 'accelerations': [acceleration]}
+    return {'joint_reference': state, 'reference_point': JointTrajectoryPoint(**motion, time_from_start=Duration())}
 
 
 def sensor_messages(stamp: int, readings: Readings, options: StandardMessages) -> dict[str, Any]:

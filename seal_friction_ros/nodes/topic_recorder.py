@@ -18,11 +18,7 @@ from seal_friction_ros.offline.bags.bag import BagError, BagWriter
 
 
 class TopicRecorder(Node):
-    """Subscribes, with best effort, to every topic of the given types that appears, and keeps its messages.
-
-    Args:
-        types: ``package/msg/Name`` of each type.
-    """
+    """Subscribes, with best effort, to every topic of some types (``package/msg/Name``), and keeps its messages."""
 
     def __init__(self, types: Collection[str]) -> None:
         super().__init__('topic_recorder')
@@ -36,9 +32,8 @@ class TopicRecorder(Node):
         for topic, (kind, *_) in self.get_topic_names_and_types():
             if kind in self._types and topic not in self._topics:
                 self._topics.add(topic)
-                self.create_subscription(
-                    message_class(kind), topic, partial(self._take, topic, kind), qos.best_effort(qos.STREAM), raw=True
-                )
+                take, profile = partial(self._take, topic, kind), qos.best_effort(qos.STREAM)
+                self.create_subscription(message_class(kind), topic, take, profile, raw=True)
 
     def _take(self, topic: str, kind: str, data: bytes) -> None:
         self.messages.append((topic, kind, time.time_ns(), data))
@@ -47,8 +42,7 @@ class TopicRecorder(Node):
 def record(node: TopicRecorder, seconds: float, wait: float, out: Path) -> int:
     """Record for ``seconds`` [s], from the first message on, for which it waits ``wait`` [s] at most; exit code 0.
 
-    Raises:
-        BagError: No topic of the types has a message, or the bag cannot be written.
+    BagError: no topic of the types has a message, or the bag cannot be written.
     """
     end = time.monotonic() + wait
     is_begun = False
@@ -59,10 +53,8 @@ def record(node: TopicRecorder, seconds: float, wait: float, out: Path) -> int:
             is_begun, end = True, time.monotonic() + seconds
     if not node.messages:
         heard = ', '.join(f'{topic} ({", ".join(kinds)})' for topic, kinds in node.get_topic_names_and_types())
-        raise BagError(
-            f'no message of a known type within {wait:g} s: start the drivers, check ROS_DOMAIN_ID; '
-            f'topics: {heard or "none"}'
-        )
+        hint = 'start the drivers, check ROS_DOMAIN_ID'
+        raise BagError(f'no message of a known type within {wait:g} s: {hint}; topics: {heard or "none"}')
     with BagWriter(out) as writer:
         for message in node.messages:
             writer.write(*message)

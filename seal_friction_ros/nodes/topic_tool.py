@@ -34,12 +34,7 @@ class NotThereError(ValueError):
 
 
 class Tool:
-    """A node that looks at the graph.
-
-    Args:
-        node: The node.
-        wait: Wait [s] for all names of the graph; longest wait for one name, or for an answer.
-    """
+    """A node that looks at the graph; it waits [s] for all names there, at most for one name or an answer."""
 
     def __init__(self, node: Node, wait: float) -> None:
         self.node, self._wait = node, wait
@@ -52,11 +47,7 @@ class Tool:
         return until()
 
     def found(self, name: str, known: Callable[[], Iterable[str]], what: str) -> str:
-        """Full name of a topic, service or node, which may take a while to appear.
-
-        Raises:
-            NotThereError: It does not appear.
-        """
+        """Full name of a topic, service or node, which may take a while to appear; NotThereError if it does not."""
         full = name if name.startswith('/') else f'/{name}'
         if self.spin(self._wait, lambda: full in known()):
             return full
@@ -89,11 +80,9 @@ class Tool:
         offers = [end.qos_profile for end in self.node.get_publishers_info_by_topic(topic)]
         best_effort = any(offer.reliability == ReliabilityPolicy.BEST_EFFORT for offer in offers)
         latched = bool(offers) and all(offer.durability == DurabilityPolicy.TRANSIENT_LOCAL for offer in offers)
-        profile = QoSProfile(
-            depth=1000,
-            reliability=ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE,
-            durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
-        )
+        reliability = ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE
+        durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
+        profile = QoSProfile(depth=1000, reliability=reliability, durability=durability)
         self.node.create_subscription(message_class(self.topics()[topic]), topic, take, profile, raw=raw)
         return topic
 
@@ -151,11 +140,7 @@ class Tool:
         return [f'{space}/{node}'.replace('//', '/') for node, space in found]
 
     def answer(self, future: Any, who: str) -> Any:
-        """Result of a call.
-
-        Raises:
-            NotThereError: There is none.
-        """
+        """Result of a call; NotThereError if there is none."""
         if not self.spin(self._wait, future.done):
             raise NotThereError(f'{who} gives no answer within {self._wait:g} s')
         return future.result()
@@ -184,11 +169,7 @@ class Tool:
 
 
 def filled(message: Any, values: Mapping[str, Any]) -> Any:
-    """A message with some fields set.
-
-    Raises:
-        ValueError: There is no such field, or a value has another type.
-    """
+    """A message with some fields set; ValueError if there is no such field, or a value has another type."""
     fields = message.get_fields_and_field_types()
     for name, value in values.items():
         if name not in fields:
@@ -226,9 +207,8 @@ def _yaml(value: Any) -> str:
 def _listed(found: Mapping[str, Mapping[str, Any]]) -> str:
     lines = []
     for topic, one in found.items():
-        ends = [
-            f'{what} {", ".join(one[key])}' for what, key in (('from', 'publishers'), ('to', 'subscribers')) if one[key]
-        ]
+        named = {'from': one['publishers'], 'to': one['subscribers']}
+        ends = [f'{what} {", ".join(names)}' for what, names in named.items() if names]
         lines.append(f'{topic}  {one["type"]}\n    {"; ".join(ends) or "no endpoint"}')
     return '\n'.join(lines) or 'no topic'
 
@@ -236,22 +216,15 @@ def _listed(found: Mapping[str, Mapping[str, Any]]) -> str:
 def _rate_text(found: Mapping[str, Any]) -> str:
     if found['rate_Hz'] is None:
         return f'{found["topic"]}: {found["messages"]} messages: too few for a rate'
-    return (
-        f'{found["topic"]}: {found["rate_Hz"]:.1f} Hz, {found["messages"]} messages, '
-        f'gaps {1e3 * found["shortest_gap_s"]:.2f} to '
-        f'{1e3 * found["longest_gap_s"]:.2f} ms, {found["bytes_per_s"] / 1e3:.1f} kB/s'
-    )
+    gaps = f'gaps {1e3 * found["shortest_gap_s"]:.2f} to {1e3 * found["longest_gap_s"]:.2f} ms'
+    counts = f'{found["topic"]}: {found["rate_Hz"]:.1f} Hz, {found["messages"]} messages'
+    return f'{counts}, {gaps}, {found["bytes_per_s"] / 1e3:.1f} kB/s'
 
 
 def run_task(tool: Tool, task: Mapping[str, Any]) -> int:
-    """Run one task, print its result, return the exit code.
+    """Run a task, ``action`` (list, hz, echo, param or call) and arguments; print its result, return the exit code.
 
-    Args:
-        tool: The node.
-        task: ``action`` (list, hz, echo, param or call), and its arguments.
-
-    Raises:
-        ValueError: A name is not there, or a value is not valid.
+    ValueError: a name is not there, or a value is not valid.
     """
     as_json = bool(task.get('json'))
 

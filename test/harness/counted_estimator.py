@@ -21,8 +21,8 @@ class CountedEstimator(FrictionEstimator):
         self.clock: Callable[[], int] | None = None
         super().__init__(**kwargs)
 
-    def _now(self) -> int:
-        return self.clock() if self.clock else super()._now()
+    def now(self) -> int:
+        return self.clock() if self.clock else super().now()
 
     def _follow_clock(self, offset: int) -> None:
         if self.clock is None:
@@ -31,7 +31,7 @@ class CountedEstimator(FrictionEstimator):
     @property
     def is_tick_due(self) -> bool:
         """Whether the watchdog will act at its next call."""
-        return self.active and bool(due(self._state, self._now()))
+        return self.active and bool(due(self._state, self.now()))
 
     def on_input(self, name: str, data: bytes, lateness: int) -> None:
         super().on_input(name, data, 0 if self.clock else lateness)

@@ -105,7 +105,7 @@ def test_recording_stops_before_the_disk_is_full_and_continues_in_a_bag_that_rep
         g.connect()
         for number in range(1, 50):
             g.estimate(number * 10**6, 0.1, force=30.0)
-        assert g.spin_until(lambda: not g.estimator._recording._recorder.waiting)
+        assert g.spin_until(lambda: not g.estimator.recording.recorder.waiting)
         disk.free = 10**9 - 1
         assert g.spin_until(lambda: 'recording stopped' in g.probe.values('recorder').get('message', ''))
         assert g.probe.values('recorder')['level'] == '2'
@@ -146,14 +146,14 @@ def test_a_long_recording_keeps_its_newest_bags_and_each_replays_alone(tmp_path:
     begun = set()
     with graph(parameters) as g:
         g.connect()
-        recorder = g.estimator._recording._recorder
+        recorder = g.estimator.recording.recorder
         for number in range(15):
             for moment in range(10):
                 g.estimate((10 * number + moment + 1) * 10**6, 0.1, force=30.0)
             present = recorder.path
             begun.add(present)
             for _ in range(100):
-                recorder.record('/t', 'std_msgs/msg/String', g.estimator._now(), bytes(10_000))
+                recorder.record('/t', 'std_msgs/msg/String', g.estimator.now(), bytes(10_000))
             assert g.spin_until(lambda present=present: recorder.path != present)
         g.estimate(10**9, 0.1, force=30.0)
     left = sorted(tmp_path.iterdir())
@@ -171,7 +171,7 @@ def test_a_recording_is_split_as_the_parameters_say(tmp_path: Path):
         {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag', 'record_split_size': 1_000_000}
     ) as g:
         g.connect()
-        recording = g.estimator._recording
+        recording = g.estimator.recording
         for number in range(9000):
             recording.record('/t', 'std_msgs/msg/String', number, bytes(400))
     assert len(list((tmp_path / 'bag').glob('*.mcap'))) == 5

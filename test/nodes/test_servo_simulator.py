@@ -28,8 +28,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from seal_friction_ros.core.messages.records import Status
-from seal_friction_ros.core.servo.cylinder import AMBIENT
+from seal_friction_ros.core.servo.cylinder import AMBIENT, Cylinder
 from seal_friction_ros.core.servo.motions import Sine
+from seal_friction_ros.core.servo.plant import Load
 from seal_friction_ros.core.servo.simulator_options import StandardMessages
 from seal_friction_ros.nodes import servo_simulator, standard_messages
 from seal_friction_ros.nodes.servo_simulator import ServoSimulator
@@ -325,14 +326,14 @@ def test_standard_messages_say_what_the_machine_is_absolute_pressures_among_them
         }
         common = sorted(set.intersection(*(set(messages) for messages in by_stamp.values())))
         assert len(common) > 40
-        cylinder = s.simulator._servo.cylinder
+        cylinder = s.simulator.settings(Cylinder)
         for stamp in common:
             joint = by_stamp['joint_states'][stamp]
             assert list(joint.name) == ['rod']
             assert abs(joint.position[0] - by_stamp['joint_reference'][stamp].position[0]) < 2e-3
             a, b = (by_stamp[f'pressure_{chamber}'][stamp].fluid_pressure for chamber in 'ab')
             assert 1e5 < a < b < 7.1e6  # [Pa, absolute] the smaller area b has the higher pressure
-            load = -s.simulator._servo.load.viscous_damping * joint.velocity[0]  # all that is on this rod
+            load = -s.simulator.settings(Load).viscous_damping * joint.velocity[0]  # all that is on this rod
             assert by_stamp['load_cell'][stamp].wrench.force.x == pytest.approx(load, abs=1e-6)
             assert abs((a - AMBIENT) * cylinder.area_a - (b - AMBIENT) * cylinder.area_b) < 200.0  # [N]
 
@@ -453,7 +454,7 @@ def test_deactivated_it_is_silent_and_starts_again_from_the_beginning():
     with stage() as s:
         s.wait(lambda: len(s.listener.heard['rod_velocity']) > 20)
         s.simulator.trigger_deactivate()
-        count = s.simulator._index  # ticks; each one was heard
+        count = s.simulator.ticks  # ticks; each one was heard
         s.wait(lambda: len(s.listener.heard['rod_velocity']) >= count)
         s.spin(0.05)  # 25 samples
         assert len(s.listener.heard['rod_velocity']) == count
