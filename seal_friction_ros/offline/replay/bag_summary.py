@@ -17,8 +17,9 @@ from seal_friction_ros.offline.bags.bag import BagError, bag_topics
 from seal_friction_ros.offline.replay.bag_health import bag_health
 from seal_friction_ros.offline.replay.bag_parts import AS_RECORDED, Chosen, try_bags
 from seal_friction_ros.offline.replay.compiled_replay import compile_now, first_configurations
-from seal_friction_ros.offline.replay.health_indicators import Limits, alarms_of, day_of
+from seal_friction_ros.offline.replay.health_indicators import alarms_of, day_of
 from seal_friction_ros.offline.replay.parallel_replay import verify
+from seal_friction_ros.offline.replay.run_findings import verdict_in_words
 from seal_friction_ros.offline.work.executor import Workers
 from seal_friction_ros.offline.work.finished_parts import Kept
 from seal_friction_ros.offline.work.outcome import Outcome
@@ -49,7 +50,9 @@ class BagSummary(NamedTuple):
     offset: float  # [N] of the force sum
     residual: float  # [-] root mean square of the residual while sliding, over the Coulomb friction
     disagreeing: float  # [-] share of the sliding samples with `Status.MODEL_DISAGREES`
-    alarms: str  # of the health of its seals; empty if there is none
+    level: str  # GOOD, LOOK or BAD
+    why: str  # the finding that decides
+    next: str  # what to do
     health: str  # why the health cannot be told; empty if it is
     levels: FloatArray  # shape (n, len(LEVEL_COLUMNS)): a row a pressure level
 
@@ -87,7 +90,7 @@ def bag_summary(bag: Path, chosen: Chosen = AS_RECORDED) -> BagSummary:
         day.offset.value if day else math.nan,
         _relative_residual(table),
         _mean(table, 'disagreeing'),
-        '; '.join(alarms_of(day, Limits())) if day else '',
+        *verdict_in_words(bag, chosen, alarms_of(day, chosen.limits) if day else []),
         why,
         table,
     )

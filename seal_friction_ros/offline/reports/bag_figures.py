@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from seal_friction_ros.core.estimation.strokes import PressureLevel
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import BAR
@@ -14,7 +15,7 @@ from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.messages.records import Status
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun
 from seal_friction_ros.offline.reports import figure_style as style
-from seal_friction_ros.offline.reports.bag_evaluation import BagEvaluation, PressureLevel, worst_level
+from seal_friction_ros.offline.reports.bag_evaluation import BagEvaluation, worst_level
 from seal_friction_ros.offline.reports.figure_style import Plot, finished
 from seal_friction_ros.offline.reports.formatting import force_unit, number, speed_unit
 

@@ -6,9 +6,9 @@ import pytest
 from harness.report_page import checked_page
 from paths import ROOT
 
+from seal_friction_ros.core.estimation.findings import GOOD, LOOK
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.reports.comparison_report import common_changes, mean_change, write_comparison
-from seal_friction_ros.offline.reports.page import GOOD, LOOK
 
 PULL_TEST = ROOT / 'bags' / 'pull_test'
 
