@@ -126,6 +126,7 @@ class Seen(NamedTuple):
     sliding: int = 0  # estimates
     faulty: int = 0  # estimates with inputs that are not good
     extrapolated: int = 0  # estimates
+    disagreeing: int = 0  # sliding estimates whose friction is not that of the model
     counts: IntArray = np.zeros(len(Status), np.int64)  # estimates with each bit of the status, in their order
     since: FloatArray = np.full(len(Status), math.inf)  # [s] first estimate with each
     silences: tuple[tuple[float, float], ...] = ()  # [s] begin and length of each stretch without estimates
@@ -136,15 +137,16 @@ def seen_in(run: Samples) -> Seen:
     """What a run shows, from its columns."""
     if not len(run.time):
         return Seen()
-    held = (run.status & _BITS[:, np.newaxis]) != 0
+    held, slides = (run.status & _BITS[:, np.newaxis]) != 0, run.state == FrictionState.SLIDING
     wide = np.flatnonzero(np.diff(run.time) > MAX_GAP)
     return Seen(
         float(run.time[0]),
         float(run.time[-1]),
         len(run.time),
-        int(np.count_nonzero(run.state == FrictionState.SLIDING)),
+        int(np.count_nonzero(slides)),
         int(np.count_nonzero(run.status & _FAULTS)),
         int(np.count_nonzero(run.status & _EXTRAPOLATED)),
+        int(np.count_nonzero(run.status[slides] & _DISAGREES)),
         held.sum(axis=1),
         np.where(held.any(axis=1), run.time[held.argmax(axis=1)], math.inf),
         tuple(zip(run.time[wide].tolist(), np.diff(run.time)[wide].tolist(), strict=True)),
@@ -158,18 +160,15 @@ def together(parts: Sequence[Seen]) -> Seen:
     if not parts:
         return Seen()
     between = [(one.end, then.begin - one.end) for one, then in pairwise(parts) if then.begin - one.end > MAX_GAP]
-    estimates, sliding, faulty, extrapolated = np.sum([part[2:6] for part in parts], axis=0).tolist()
+    names = ('estimates', 'sliding', 'faulty', 'extrapolated', 'disagreeing')
     return Seen(
-        parts[0].begin,
-        parts[-1].end,
-        estimates,
-        sliding,
-        faulty,
-        extrapolated,
-        np.sum([part.counts for part in parts], axis=0),
-        np.min([part.since for part in parts], axis=0),
-        tuple(sorted([*between, *(one for part in parts for one in part.silences)])),
-        Events(*(tuple(one for part in parts for one in part.events[kind]) for kind in (0, 1))),
+        begin=parts[0].begin,
+        end=parts[-1].end,
+        **{name: sum(getattr(part, name) for part in parts) for name in names},
+        counts=np.sum([part.counts for part in parts], axis=0),
+        since=np.min([part.since for part in parts], axis=0),
+        silences=tuple(sorted([*between, *(one for part in parts for one in part.silences)])),
+        events=Events(*(tuple(one for part in parts for one in part.events[kind]) for kind in (0, 1))),
     )
 
 
@@ -304,17 +303,16 @@ def _data(seen: Seen) -> Iterator[Finding]:
         what = f'no estimate for {lost:.1f} s, {percent(silent)} of the time'
         after = 'find out what stopped: node, network or recorder'
         yield Finding(level, what, after, silent, since=seen.silences[0][0])
-    disagreeing = int(seen.counts[_BITS == _DISAGREES].sum())
     for share, limit, bits, most, words in (
-        (seen.faulty / seen.estimates, MOST_FLAGGED, _FAULTS, BAD, 'have inputs that are not good'),
-        (seen.extrapolated / seen.estimates, MOST_FLAGGED, _EXTRAPOLATED, LOOK, 'are beyond what was identified'),
-        (disagreeing / max(seen.sliding, 1), DISAGREEING, _DISAGREES, LOOK, 'disagree with the model'),
+        (seen.faulty / seen.estimates, MOST_FLAGGED, _FAULTS, BAD, 'estimates have inputs that are not good'),
+        (seen.extrapolated / seen.estimates, MOST_FLAGGED, _EXTRAPOLATED, LOOK, 'estimates are not identified'),
+        (seen.disagreeing / max(seen.sliding, 1), DISAGREEING, _DISAGREES, LOOK, 'sliding estimates disagree'),
     ):
         level = min(between(share, limit, FAR_TOO_MANY_FLAGGED), most, key=_ORDER.index)
         if level != GOOD:
             held = (_BITS & bits) != 0
             often = Status(int(_BITS[np.argmax(np.where(held, seen.counts, -1))]))
-            what = f'{percent(share)} of the estimates {words}: {STATUS_WORDS[often]}'
+            what = f'{percent(share)} of the {words}: {STATUS_WORDS[often]}'
             after = 'look at the status bits; docs/degradation.md says what each one means'
             yield Finding(level, what, after, share, since=float(seen.since[held].min()))
 

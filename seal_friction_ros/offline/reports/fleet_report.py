@@ -23,6 +23,7 @@ from seal_friction_ros.offline.work.places import Place
 HOURS_A_DAY = 24.0
 FIRST_DATE = 365.0 * 86400.0  # [s] a stamp before 1971 is no date (our choice)
 _COLOURS = (style.VERMILLION, style.BLUE, style.GREEN, style.ORANGE, style.PURPLE, style.SKY)
+_MOST_NAMED = 3  # rigs in the verdict
 FEWEST_BAGS = 4  # with a date, that tell a change of a rig (our choice)
 
 
@@ -70,12 +71,12 @@ class _Point(NamedTuple):
 
 
 def rigs_of(bags: Sequence[FleetBag]) -> list[Rig]:
-    """The folders of the bags: those whose friction has changed first, then the worst, then by name."""
+    """The folders of the bags: those whose friction has changed most first, then the worst, then by name."""
     folders: dict[str, list[FleetBag]] = {}
     for bag in bags:
         folders.setdefault(_folder(bag), []).append(bag)
     rigs = [_rig(name, of_rig) for name, of_rig in sorted(folders.items())]
-    return sorted(rigs, key=lambda rig: (math.isnan(rig.change), -_ORDER.index(rig.level)))
+    return sorted(rigs, key=lambda rig: (-abs(np.nan_to_num(rig.change)), -_ORDER.index(rig.level)))
 
 
 _ORDER = (GOOD, LOOK, BAD)
@@ -193,7 +194,9 @@ def _verdict(bags: Sequence[FleetBag], rigs: Sequence[Rig]) -> Verdict:
     counted = (
         f'{bad} of {total} {"bag" if total == 1 else "bags"} {"is" if bad == 1 else "are"} bad, {damaged} damaged; '
     )
-    text = f'{counted}{look} to look at. {Path(rigs[0].name).name}: {rigs[0].why.rstrip(".")}.'
+    first = [rig for rig in rigs if not math.isnan(rig.change)][:_MOST_NAMED] or rigs[:1]
+    named = '; '.join(f'{Path(rig.name).name}: {rig.why.rstrip(".")}' for rig in first)
+    text = f'{counted}{look} to look at. {named}.'
     return Verdict(level, text, 'seal_friction report BAG --out PAGE.html shows a bag in full.')
 
 
@@ -252,12 +255,12 @@ def _figure(bags: Sequence[FleetBag], rigs: Sequence[Rig]) -> Plot:
     figure, axes = style.new_figure('Friction over that of the seal file, each rig over its dates', 3.4)
     known = {rig.name: _points([bag for bag in bags if _folder(bag) == rig.name]) for rig in rigs}
     begin = min((points[0].time for points in known.values() if points), default=0.0)
-    for number, (name, points) in reversed(list(enumerate(known.items()))):
+    for number, (name, points) in enumerate(known.items()):
         if points:
             days, scales = [(one.time - begin) / 86400.0 for one in points], [one.scale.value for one in points]
             named = number < len(_COLOURS)
             look = {'color': _COLOURS[number], 'label': Path(name).name} if named else {}
-            axes.plot(days, scales, 'o-', ms=3.0, lw=1.2, **({'color': style.GREY} | look))
+            axes.plot(days, scales, 'o-', ms=3.0, lw=1.2, zorder=3.0 - 0.01 * number, **({'color': style.GREY} | look))
     axes.axhline(1.0, color=style.GREY, lw=0.8)
     axes.set_xlabel(f'days since {_date(begin)[:10]}' if begin else 'no bag has a date')
     return finished('scale', figure, axes, ylabel='friction / seal file [-]')

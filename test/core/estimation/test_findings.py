@@ -83,7 +83,7 @@ def test_a_stream_shows_what_its_columns_show(end):
         if row[0] <= end:
             stream.add((1e9 + row[0], *row[1:]))
     seen = stream.seen()
-    assert seen[2:6] == part[2:6]
+    assert seen[2:7] == part[2:7]
     np.testing.assert_array_equal(seen.counts, part.counts)
     assert [length for _, length in seen.silences] == pytest.approx([length for _, length in part.silences])
     for mine, theirs in zip(seen.events, part.events, strict=True):
@@ -163,7 +163,7 @@ def test_a_time_without_estimates_is_told_with_its_beginning(length, level):
         (0.05, Status.PRESSURE_STALE, LOOK, 'the pressure is old'),
         (0.2, Status.PRESSURE_STALE, BAD, 'the pressure is old'),
         (0.2, Status.OUTSIDE_IDENTIFIED_RANGE, LOOK, 'extrapolated'),
-        (0.2, Status.MODEL_DISAGREES, LOOK, 'disagree with the model'),
+        (0.2, Status.MODEL_DISAGREES, LOOK, 'of the sliding estimates disagree'),
         (0.2, Status.MOTION_UNCERTAIN, GOOD, '10 of 10'),  # every reversal has it
         (0.2, Status(2 * int(max(Status))), GOOD, '10 of 10'),  # of a newer version
     ],
