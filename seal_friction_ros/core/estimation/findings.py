@@ -8,7 +8,7 @@ import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -87,22 +87,16 @@ class Finding(NamedTuple):
     level: str  # GOOD, LOOK or BAD
     what: str  # with how much, no full stop
     next: str  # what to do, likewise
-    amount: float = math.nan  # [-] as a share
-    noise: float = math.nan  # [-] that 95 % of repetitions stay below
-    since: float = math.nan  # [s] since the first estimate
+    amount: float | None = None  # [-] as a share
+    noise: float | None = None  # [-] that 95 % of repetitions stay below
+    since: float | None = None  # [s] since the first estimate
     name: str = ''  # of the run that it is of, where there are several
 
     @property
     def text(self) -> str:
         """In words, with name and beginning."""
-        began = f', first at {self.since:.1f} s' if math.isfinite(self.since) else ''
+        began = '' if self.since is None else f', first at {self.since:.1f} s'
         return (f'{self.name}: ' if self.name else '') + self.what + began
-
-    def numbers(self) -> dict[str, Any]:
-        """For JSON."""
-        known = {name: getattr(self, name) for name in ('amount', 'noise', 'since')}
-        finite = {name: value if math.isfinite(value) else None for name, value in known.items()}
-        return {'level': self.level, 'what': self.what, 'next': self.next, **finite}
 
 
 class Limits(NamedTuple):

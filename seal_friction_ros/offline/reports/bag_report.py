@@ -91,8 +91,7 @@ def write_report(bag: Path, out: Path, namespace: str = '', mapping: MappingFile
         feedforward_table=table_of(stretches, _FEEDFORWARD_COLUMNS),
     )
     numbers = bag_evaluation.evaluation_numbers(evaluation) | {'placeholder_seals': PLACEHOLDER in found}
-    numbers |= {'level': verdict.level, 'verdict': verdict.text}
-    numbers['findings'] = [one.numbers() for one in found]
+    numbers |= {'level': verdict.level, 'verdict': verdict.text, 'findings': [one._asdict() for one in found]}
     return ReportSummary(out, figures, numbers | {'tracking': tracking_evaluation.tracking_numbers(tracking)})
 
 
