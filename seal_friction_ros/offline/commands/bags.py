@@ -117,7 +117,7 @@ def run_compare(arguments: argparse.Namespace) -> int:
             if getattr(arguments, option):
                 raise ValueError(f'--{option} is for messages of equal stamp: leave it out, or leave out --out')
         report = write_comparison(arguments.a, arguments.b, arguments.out, arguments.namespace, mapping)
-        return cli.print_result(arguments, report, report.numbers['verdict'])
+        return cli.print_result(arguments, report, f'{report.numbers["level"]}: {report.numbers["verdict"]}')
     from seal_friction_ros.offline.replay.compare import compare
 
     found = compare(
@@ -147,9 +147,7 @@ def run_recover(arguments: argparse.Namespace) -> int:
 
 def run_report(arguments: argparse.Namespace) -> int:
     """Write the page."""
-    from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING
     from seal_friction_ros.offline.reports.bag_report import write_report
 
     summary = write_report(arguments.bag, arguments.out, arguments.namespace, cli.mapping_of(arguments))
-    warning = f'warning: {PLACEHOLDER_WARNING}' if summary.numbers['placeholder_seals'] else ''
-    return cli.print_result(arguments, summary, warning)
+    return cli.print_result(arguments, summary, f'{summary.numbers["level"]}: {summary.numbers["verdict"]}')

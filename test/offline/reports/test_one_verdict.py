@@ -139,3 +139,10 @@ def test_a_bag_without_a_message_is_refused_by_all_in_one_line(bags, tmp_path, c
     (bag,) = told(capsys, 'fleet', tmp_path / 'bags.txt', '--out', out, '--workers', '1')['bags']
     assert bag['level'] == 'bad'
     assert 'nothing to estimate from' in bag['why']
+
+
+def test_the_terminal_says_the_verdict_first(bags, tmp_path, capsys):
+    assert main(['report', str(bags / 'drifting'), '--out', str(tmp_path / 'page.html')]) == 0
+    assert capsys.readouterr().out.startswith('look: The friction drifts by +1')
+    assert main(['compare', str(bags / 'good'), str(bags / 'weaker'), '--out', str(tmp_path / 'change.html')]) == 0
+    assert capsys.readouterr().out.startswith('look: Sliding friction -17.0 %')
