@@ -2,15 +2,12 @@
 
 import math
 
-from seal_friction_ros.offline.reports.page import GOOD, LOOK, Verdict
+from seal_friction_ros.core.estimation.findings import GOOD, LOOK, Verdict, between, percent, worst
 from seal_friction_ros.offline.reports.verdicts import (
     LARGE_ERROR,
     LARGE_NUMERICS,
     SMALL_ERROR,
     SMALL_NUMERICS,
-    between,
-    percent,
-    worst,
 )
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from seal_friction_ros.core.estimation.configuration import parse_snapshot
+from seal_friction_ros.core.estimation.strokes import LARGEST_INPUT, Samples
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.documents import NotJsonError, parse_json
 from seal_friction_ros.core.friction.actuator import MountedSeal
@@ -25,9 +26,6 @@ from seal_friction_ros.offline.bags.actuator_bag import RECORDED, ActuatorBag, o
 from seal_friction_ros.offline.bags.bag import BagError
 from seal_friction_ros.offline.bags.columns import Block, Held, Wanted, collected, extend, growing, in_turn, wanted_of
 from seal_friction_ros.offline.bags.mapped_bag import MappingFile
-
-MAX_GAP = 0.5  # [s] samples further apart do not belong to one stretch of a recording (our choice)
-LARGEST_INPUT = 1e15  # [SI] above any real pressure, force or speed; the comparison also drops NaN and infinity
 
 _MAX_PENDING = 10_000  # velocity samples that may wait for their estimate; older ones never got one
 _MAX_FRAMES = 10  # frame names that are kept
@@ -75,6 +73,11 @@ class RecordedRun:
         """Mean of the pressures at the seals [Pa, gauge]."""
         mean: FloatArray = pressures_at_seals(self.chambers, self.pressure_a, self.pressure_b).mean(axis=1)
         return mean
+
+    @property
+    def samples(self) -> Samples:
+        """What findings and strokes are read from."""
+        return Samples(*(getattr(self, name) for name in Samples._fields))
 
 
 def read_run(bag: Path, namespace: str = '', mapping: MappingFile | None = None) -> RecordedRun:

@@ -18,7 +18,7 @@ def add_parser(commands: Any) -> None:
     )  # fmt: skip
     compare = cli.add_command(
         commands, 'compare', run_compare, 'compare a topic of two bags, or two runs or seals on a page',
-        'compare recorded replayed --rtol 0.05',
+        'compare recorded replayed --rtol 0.05 --fields coulomb_friction friction_force=0.5 state',
         'compare before after --out change.html',
         'compare ms28775_114 my_seal.yaml --out seals.html',
     )  # fmt: skip
@@ -54,6 +54,10 @@ _OF_COMPARE: dict[str, tuple[str, cli.Settings]] = {
     '--topic': ('default: the friction estimates of each bag', {'default': ''}),
     '--atol': ('absolute tolerance, default 0', {'type': cli.non_negative, 'default': 0.0}),
     '--rtol': ('relative tolerance, default 0', {'type': cli.non_negative, 'default': 0.0}),
+    '--fields': (
+        'fields that decide, each with its absolute tolerance if it has one of its own; default: the friction',
+        {'nargs': '+', 'metavar': 'FIELD[=TOLERANCE]', 'default': []},
+    ),
 }
 
 
@@ -109,18 +113,28 @@ def run_compare(arguments: argparse.Namespace) -> int:
     if arguments.out:
         from seal_friction_ros.offline.reports.comparison_report import write_comparison
 
-        for option in ('topic', 'atol', 'rtol'):
+        for option in ('topic', 'atol', 'rtol', 'fields'):
             if getattr(arguments, option):
                 raise ValueError(f'--{option} is for messages of equal stamp: leave it out, or leave out --out')
         report = write_comparison(arguments.a, arguments.b, arguments.out, arguments.namespace, mapping)
-        return cli.print_result(arguments, report, report.numbers['verdict'])
+        return cli.print_result(arguments, report, f'{report.numbers["level"]}: {report.numbers["verdict"]}')
     from seal_friction_ros.offline.replay.compare import compare
 
     found = compare(
         arguments.a, arguments.b, arguments.topic, arguments.atol, arguments.rtol,
         namespace=arguments.namespace, mapping=mapping,
+        tolerances=dict(_tolerance(text) for text in arguments.fields),
     )  # fmt: skip
     return cli.print_result(arguments, found.numbers(), found.summary(), cli.SUCCESS if found.agree else cli.DIFFERENT)
+
+
+def _tolerance(text: str) -> tuple[str, float | None]:
+    """Field and absolute tolerance of ``FIELD[=TOLERANCE]``."""
+    name, has_tolerance, value = text.partition('=')
+    try:
+        return name, cli.non_negative(value) if has_tolerance else None
+    except (ValueError, argparse.ArgumentTypeError) as error:
+        raise ValueError(f'--fields {text}: {error}') from None
 
 
 def run_recover(arguments: argparse.Namespace) -> int:
@@ -133,9 +147,7 @@ def run_recover(arguments: argparse.Namespace) -> int:
 
 def run_report(arguments: argparse.Namespace) -> int:
     """Write the page."""
-    from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING
     from seal_friction_ros.offline.reports.bag_report import write_report
 
     summary = write_report(arguments.bag, arguments.out, arguments.namespace, cli.mapping_of(arguments))
-    warning = f'warning: {PLACEHOLDER_WARNING}' if summary.numbers['placeholder_seals'] else ''
-    return cli.print_result(arguments, summary, warning)
+    return cli.print_result(arguments, summary, f'{summary.numbers["level"]}: {summary.numbers["verdict"]}')

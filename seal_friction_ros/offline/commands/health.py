@@ -48,26 +48,27 @@ _LIMITS: dict[str, tuple[str, cli.Settings]] = {
 
 def run_health(arguments: argparse.Namespace) -> int:
     """Follow the bags in order of time."""
+    from seal_friction_ros.core.estimation.findings import Limits
     from seal_friction_ros.offline.replay.bag_health import health_of_bags
-    from seal_friction_ros.offline.replay.health_indicators import Limits
     from seal_friction_ros.offline.replay.replay import chosen_configuration
     from seal_friction_ros.offline.reports.health_report import write_health_report
 
     override = chosen_configuration(arguments.params, arguments.seal)
     workers, kept = cli.workers_of(arguments), cli.kept_in(arguments)
-    outcomes = health_of_bags(arguments.bags, arguments.namespace, override, workers, kept, cli.mapping_of(arguments))
+    limits = Limits(arguments.scale_low, arguments.scale_high, arguments.breakaway, arguments.noise)
+    mapping = cli.mapping_of(arguments)
+    outcomes = health_of_bags(arguments.bags, arguments.namespace, override, workers, kept, mapping, limits)
     errors = [outcome.error for outcome in outcomes if outcome.error]
     seen = [(outcome.result, bag) for outcome, bag in zip(outcomes, arguments.bags, strict=True) if outcome.result]
     seen.sort(key=lambda pair: pair[0].time[0] if len(pair[0].time) else 0.0)
-    limits = Limits(arguments.scale_low, arguments.scale_high, arguments.breakaway, arguments.noise)
     if not seen:
         return cli.print_result(arguments, {'bags': [], 'errors': errors}, '', cli.UNUSABLE, errors)
     names = [str(bag) for _, bag in seen]
     summary = write_health_report(names, [one for one, _ in seen], arguments.out, limits)
-    lines = []
+    lines = [f'{summary.numbers["level"]}: {summary.numbers["verdict"]}']
     for day in summary.numbers['bags']:
         lines.append(f'{day["bag"]}: {_learnt_text(day) if day["reversals"] else "no reversal to learn from"}')
-        lines += [f'  alarm: {alarm}' for alarm in day['alarms']]
+        lines += [f'  {day["level"]}: {day["why"]}', *(f'  alarm: {alarm}' for alarm in day['alarms'])]
     lines += [
         f'change: from {change["scale_before"]:.3f} to {change["scale_then"]:.3f} at {change["time_s"]:.3f} s'
         for change in summary.numbers['changes']
@@ -84,11 +85,12 @@ def _learnt_text(day: dict[str, Any]) -> str:
 
 def run_fleet(arguments: argparse.Namespace) -> int:
     """Summarise every bag; write page and table."""
+    from seal_friction_ros.core.estimation.findings import GOOD
     from seal_friction_ros.offline.bags.find_bags import find_bags
     from seal_friction_ros.offline.replay.bag_parts import Chosen
     from seal_friction_ros.offline.replay.bag_summary import DIFFERENT, summaries
     from seal_friction_ros.offline.replay.replay import chosen_configuration
-    from seal_friction_ros.offline.reports.fleet_report import judged, write_fleet_report
+    from seal_friction_ros.offline.reports.fleet_report import judged, rigs_of, write_fleet_report
     from seal_friction_ros.offline.reports.fleet_table import write_fleet_table
     from seal_friction_ros.packages import needed
 
@@ -105,7 +107,8 @@ def run_fleet(arguments: argparse.Namespace) -> int:
         write_fleet_table(bags, arguments.parquet)
     counts = report.numbers['counts']
     lines = [f'{len(bags)} bags: {", ".join(f"{count} {level}" for level, count in counts.items())}']
-    lines += [f'{bag.path}: {bag.level}: {bag.why}' for bag in bags if bag.summary is not None and bag.why]
+    lines += [f'{rig.name}: {rig.level}: {rig.why}' for rig in rigs_of(bags) if rig.level != GOOD]
+    lines += [f'{bag.path}: {bag.level}: {bag.why}' for bag in bags if bag.summary is not None and bag.level != GOOD]
     damaged = [outcome.error for outcome in outcomes if outcome.error]
     is_different = any(bag.summary is not None and bag.summary.replay == DIFFERENT for bag in bags)
     code = cli.UNUSABLE if damaged else cli.DIFFERENT if is_different else cli.SUCCESS

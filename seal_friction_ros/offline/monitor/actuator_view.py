@@ -5,16 +5,18 @@
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING, Configuration
+from seal_friction_ros.core.estimation.configuration import Configuration
+from seal_friction_ros.core.estimation.findings import BAD, LOOK, PLACEHOLDER, STATUS_WORDS, USUAL, Finding, deciding
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.friction.force_sum_correction import (
     NO_CORRECTION,
     ForceSumCorrection,
     corrected_force_sum,
 )
+from seal_friction_ros.core.friction.mounting import CHAMBERS, pressure_at_seal
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.messages.records import (
     NEVER,
@@ -26,7 +28,6 @@ from seal_friction_ros.core.messages.records import (
     Position,
     Pressure,
     ServoReference,
-    Status,
     Temperature,
     Velocity,
 )
@@ -86,40 +87,6 @@ STATE_WORDS = {
 }
 """State and direction -> words; others are unknown."""
 
-STATUS_WORDS = {
-    Status.PRESSURE_MISSING: 'no valid pressure yet: all forces are 0',
-    Status.FORCE_MISSING: 'no valid force sum yet: friction at rest is not known',
-    Status.PRESSURE_STALE: 'the pressure is old',
-    Status.FORCE_STALE: 'the force sum is old',
-    Status.PRESSURE_NOT_FINITE: 'the pressure is not a finite number',
-    Status.FORCE_NOT_FINITE: 'the force sum is not a finite number',
-    Status.VELOCITY_NOT_FINITE: 'the velocity is not a finite number',
-    Status.PRESSURE_OUT_OF_RANGE: 'the pressure is outside pressure_min to pressure_max',
-    Status.FORCE_OUT_OF_RANGE: 'the force sum is beyond force_max',
-    Status.VELOCITY_OUT_OF_RANGE: 'the velocity is beyond velocity_max',
-    Status.OUTSIDE_IDENTIFIED_RANGE: 'a pressure is outside the identified range: the law is extrapolated',
-    Status.STAMP_NOT_INCREASING: 'stamps of the velocity do not increase',
-    Status.PRESSURE_LEAP: 'the pressure jumps',
-    Status.FORCE_LEAP: 'the force sum jumps',
-    Status.VELOCITY_LEAP: 'the velocity jumps',
-    Status.INPUT_REFUSED: 'an input has a second publisher: rejected',
-    Status.STAMP_AGE: 'stamp and receipt of the velocity are too far apart: is a clock wrong?',
-    Status.MOTION_UNCERTAIN: 'the velocity does not tell rest from motion',
-    Status.FASTER_THAN_IDENTIFIED: 'faster than the seals were identified: extrapolated',
-    Status.SLOWER_THAN_IDENTIFIED: 'slower than the seals were identified: extrapolated',
-    Status.DIRECTION_NOT_IDENTIFIED: 'a direction in which a seal was not identified: extrapolated',
-    Status.FORCE_CONTAINS_LOAD: 'the force sum holds an unknown load: friction at rest is not known',
-    Status.MODEL_DISAGREES: 'the force sum shows another friction than the seal files',
-    Status.TEMPERATURE_MISSING: 'no valid temperature of the seals',
-    Status.OUTSIDE_IDENTIFIED_TEMPERATURE: 'outside the identified temperatures: extrapolated',
-    Status.PRESLIDING: 'the seals may still shear: the friction follows their elasticity',
-    Status.LATE_INPUT: 'the velocity comes late, or simulated time stands still',
-}
-"""Bit of the status -> what it means for a person who looks on; FrictionEstimate.msg has the definition."""
-
-USUAL = Status.MOTION_UNCERTAIN | Status.SLOWER_THAN_IDENTIFIED | Status.PRESLIDING
-"""Bits that every reversal has."""
-
 
 def serious_words(status: int) -> list[str]:
     """What the bits of a status mean that not every reversal has."""
@@ -138,6 +105,7 @@ class Known(NamedTuple):
     adaptation: str = OFF
     correction: ForceSumCorrection = NO_CORRECTION
     has_placeholder: bool = False
+    chambers: tuple[str, ...] = ('a', 'b')  # of the seals
 
 
 UNKNOWN_CONFIGURATION = Known()
@@ -176,6 +144,7 @@ def known_of(configuration: Configuration) -> Known:
         configuration.adaptation.mode,
         estimator.force_sum_correction,
         configuration.has_placeholder,
+        tuple(mounted.chamber for mounted in estimator.seals),
     )
 
 
@@ -263,6 +232,20 @@ def tracking_error(held: Held) -> float | None:
     return float(reference.position + velocity * apart - position.position) / MICROMETRE
 
 
+def sample_of(known: Known, held: Held) -> tuple[float, ...]:
+    """Newest estimate and its inputs as a row of `Samples`, its time [s] by its stamp; NaN for a missing input."""
+    one, velocity, pressure = held.estimate, held.records.get(Velocity), held.records.get(Pressure)
+    speed = velocity.velocity if velocity is not None and velocity.stamp == one.stamp else math.nan
+    seen = math.nan
+    if pressure is not None:
+        chambers = pressure.chamber_a, pressure.chamber_b
+        seen = sum(pressure_at_seal(CHAMBERS.index(name), *chambers) for name in known.chambers) / len(known.chambers)
+    _, force = _force_sum(known, held)
+    answers = (one.coulomb_friction, one.coulomb_friction_std, one.breakaway_force, one.friction_force)
+    ends = (one.adaptation_scale, one.state, one.direction, one.status)
+    return (one.stamp * 1e-9, speed, seen, math.nan if force is None else force, *answers, *ends)
+
+
 def measured_friction(known: Known, held: Held) -> tuple[type, float | None]:
     """Friction [N] that the measurements show: the force sum, which is the friction while the speed is even.
 
@@ -271,10 +254,16 @@ def measured_friction(known: Known, held: Held) -> tuple[type, float | None]:
     Once adaptation has learnt a scale, inertia and offset are known while the rod slides: the friction is estimate plus
     residual. Before, the offset would hide what the law misses.
     """
-    estimate, force = held.estimate, held.records.get(Force)
+    estimate = held.estimate
     has_learnt = known.adaptation != OFF and estimate.adaptation_scale != 1.0
     if has_learnt and estimate.state == FrictionState.SLIDING and estimate.residual != 0.0:
         return FrictionEstimate, estimate.friction_force + estimate.residual
+    return _force_sum(known, held)
+
+
+def _force_sum(known: Known, held: Held) -> tuple[type, float | None]:
+    """Newest force sum [N], corrected as by the estimator, with the record that it is of."""
+    force = held.records.get(Force)
     if force is None:
         return Force, None
     pressure = held.records.get(Pressure)
@@ -330,7 +319,13 @@ class Presence(NamedTuple):
 
 
 def situation(
-    known: Known, held: Held, bits: Bits, now: int, said: Said = NOTHING_SAID, presence: Presence | None = None
+    known: Known,
+    held: Held,
+    bits: Bits,
+    now: int,
+    said: Said = NOTHING_SAID,
+    presence: Presence | None = None,
+    findings: Sequence[Finding] = (),
 ) -> dict[str, Any]:
     """The situation in words and numbers, ready for JSON.
 
@@ -341,14 +336,18 @@ def situation(
         now: [ns] on the clock of receipt.
         said: What the diagnostics of the node say of the actuator.
         presence: Whether the node is there; None: not known, in a bag.
+        findings: On the run so far.
     """
     estimate, feedforward = held.estimate, held.records.get(FeedForward)
     cause, why = _cause(held, now, said, presence)
-    verdict, reason = ('bad', why) if cause else _verdict(known, held, bits.status, now, said)
+    present = [Finding(BAD, why, 'bring it back')] if cause else list(_present(held, bits.status, now, said))
+    seals = [PLACEHOLDER] if known.has_placeholder else []
+    decides = deciding([*present, *seals, *findings, _ESTIMATING])
     frame = getattr(held.records.get(Velocity), 'frame_id', b'')
     return {
-        'verdict': verdict,
-        'reason': reason,
+        'verdict': decides.level,
+        'reason': decides.text,
+        'next': decides.next,
         'cause': cause,
         'state': STATE_WORDS.get((FrictionState(estimate.state), estimate.direction), 'unknown'),
         'faults': [why] if cause else _faults(bits.status),
@@ -418,22 +417,21 @@ def _cause(held: Held, now: int, said: Said, presence: Presence | None) -> tuple
     return 'estimate', since + ('' if age is None else ': what is shown is old')
 
 
-def _verdict(known: Known, held: Held, status: int, now: int, said: Said) -> tuple[str, str]:
-    """good, look or bad, and why, while there is an estimate."""
-    if said.level > WARN:
-        return 'bad', f'the node says: {said.message}'
+_ESTIMATING = Finding('good', 'estimating, no fault', 'nothing')
+
+
+def _present(held: Held, status: int, now: int, said: Said) -> Iterator[Finding]:
+    """What is not good at this moment, while there is an estimate."""
+    if said.level >= WARN:
+        yield Finding(BAD if said.level > WARN else LOOK, f'the node says: {said.message}', 'see the diagnostics')
     serious = serious_words(status)
     if serious:
-        return 'look', serious[0] + (f', and {len(serious) - 1} more' if serious[1:] else '')
+        more = f', and {len(serious) - 1} more' if serious[1:] else ''
+        yield Finding(LOOK, f'now: {serious[0]}{more}', 'see the faults')
     old = [
         f'{INPUT_NAMES[kind]} for {age:.1f} s'
         for kind in INPUT_NAMES
         if (age := _age(held, kind, now)) is not None and age > TOO_OLD and kind is not Temperature
     ]
     if old:
-        return 'look', f'no {", no ".join(old)}'
-    if said.level == WARN:
-        return 'look', f'the node says: {said.message}'
-    if known.has_placeholder:
-        return 'look', PLACEHOLDER_WARNING
-    return 'good', 'estimating, no fault'
+        yield Finding(LOOK, f'no {", no ".join(old)}', 'see what publishes it')

@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from seal_friction_ros.core.estimation.findings import BAD, Finding
 from seal_friction_ros.offline.monitor.actuator_view import COLUMNS, Row, next_interval, recent_bits, row, situation
 from seal_friction_ros.offline.monitor.node_view import NodeView
 from seal_friction_ros.offline.monitor.off_latch import Answer, OffLatch, Scale
@@ -130,7 +131,9 @@ class LiveView:
         rows, time = self._rows.get((view.node, actuator), ()), (self._now - self._start) * 1e-9
         bits = recent_bits(reversed(rows), time)
         known, held = view.known[actuator], view.held[actuator]
-        return situation(known, held, bits, self._now, view.said(actuator), view.presence)
+        lost = [text for kind, text in (self._off_document() or {'lines': []})['lines'] if kind == 'no']
+        found = [Finding(BAD, text, 'press OFF again, or stop the node') for text in lost] + view.findings(actuator)
+        return situation(known, held, bits, self._now, view.said(actuator), view.presence, found)
 
     def change(self, label: str, parameter: str, value: float) -> list[Answer]:
         """Set a parameter of the feed-forward of one actuator.

@@ -1,14 +1,17 @@
 """One estimator as a view sees it: its configuration, its actuators, and the newest of every message."""
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+from seal_friction_ros.core.estimation.findings import Finding, Follower, findings_of
 from seal_friction_ros.core.machine.machine import Machine, init
 from seal_friction_ros.core.machine.machine_snapshot import machine_of, parse_machine_text
 from seal_friction_ros.core.messages.coder import DECODERS, decode_text
 from seal_friction_ros.core.messages.definitions import Definition
 from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, MACHINE_TYPE
+from seal_friction_ros.core.messages.records import NEVER, FrictionEstimate
 from seal_friction_ros.core.messages.together import decode_newest, decode_together
 from seal_friction_ros.offline.bags.bag import BagMessage
 from seal_friction_ros.offline.bags.mapped_bag import Translation
@@ -21,6 +24,7 @@ from seal_friction_ros.offline.monitor.actuator_view import (
     Presence,
     Said,
     known_of,
+    sample_of,
     take,
 )
 from seal_friction_ros.offline.monitor.off_latch import Scale
@@ -35,9 +39,10 @@ class NodeView:
     Args:
         node: Its name with its namespace.
         definitions_of: Looks up the definitions of the messages of a machine.
+        remembered: So long what was seen counts for the findings [s]; our choice.
     """
 
-    def __init__(self, node: str, definitions_of: DefinitionsOf) -> None:
+    def __init__(self, node: str, definitions_of: DefinitionsOf, remembered: float = 3600.0) -> None:
         self.node = node
         self.known: dict[str, Known] = {}
         """configuration of each actuator"""
@@ -55,6 +60,9 @@ class NodeView:
         self._definitions_of = definitions_of
         self._machine: Machine | None = None
         self._translation: Translation | None = None
+        self._remembered = remembered
+        self._followers: dict[str, Follower] = {}
+        self._found: dict[str, tuple[int, list[Finding]]] = {}
 
     @property
     def machine(self) -> Machine | None:
@@ -153,3 +161,18 @@ class NodeView:
     def _hold(self, actuator: str, record: Any, received: int) -> None:
         if actuator in self.held:
             self.held[actuator] = take(self.held[actuator], record, received)
+            if isinstance(record, FrictionEstimate) and record.stamp != NEVER:
+                follower = self._followers.setdefault(actuator, Follower(self._remembered))
+                follower.add(sample_of(self.known[actuator], self.held[actuator]))
+
+    def findings(self, actuator: str, until: int | None = None) -> list[Finding]:
+        """Findings on the run of an actuator up to a stamp [ns], or to the second in which the stream is."""
+        follower = self._followers.get(actuator)
+        if follower is None:
+            return []
+        key = self.held[actuator].estimate.stamp // 1_000_000_000 if until is None else until
+        if self._found.get(actuator, (None,))[0] != key:
+            seen = follower.seen(math.inf if until is None else until * 1e-9)
+            found = findings_of(seen, uses_scale=self.known[actuator].adaptation == 'on')
+            self._found[actuator] = key, found
+        return self._found[actuator][1]

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from seal_friction_ros.core.estimation.findings import Finding
 from seal_friction_ros.core.messages.coder import DECODERS
 from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, ESTIMATE_TYPE, MACHINE_TYPE
 from seal_friction_ros.offline.bags.actuator_bag import RECORDED
@@ -48,9 +49,12 @@ class _Track:
 
     Args:
         start: Number of its first row: the actuator may appear in the middle of a bag.
+        view: Its node.
+        actuator: Its name there.
     """
 
-    def __init__(self, start: int) -> None:
+    def __init__(self, start: int, view: NodeView, actuator: str) -> None:
+        self._view, self._actuator = view, actuator
         self._start = start
         self.rows = array('d')  # flat, NaN for None
         self.moments: list[tuple[Known, Held]] = []
@@ -93,6 +97,10 @@ class _Track:
             begin, said = (found[-1][0], found.pop()[2]) if is_next else (time, {})
             found.append((begin, time, said | dict.fromkeys(words)))
         return [(begin, end, '; '.join(said)) for begin, end, said in found]
+
+    def findings(self, held: Held, *, is_end: bool) -> list[Finding]:
+        """Findings on the run up to a moment."""
+        return self._view.findings(self._actuator, None if is_end else held.estimate.stamp)
 
     def moment(self, number: int) -> tuple[int, Known, Held]:
         """The last moment that is kept up to a row: number of its row, configuration, records."""
@@ -166,7 +174,7 @@ class RecordedView:
         number = round(time / self._period) - 1
         for view, _ in self._nodes:
             for actuator, known in view.known.items():
-                track = self._tracks.setdefault(view.label(actuator), _Track(number))
+                track = self._tracks.setdefault(view.label(actuator), _Track(number, view, actuator))
                 track.add(known, view.held[actuator], time, now - round(self._period * 1e9))
                 view.held[actuator] = next_interval(view.held[actuator])
 
@@ -209,7 +217,9 @@ class RecordedView:
         place, known, held = track.moment(last)
         rows = track.slice(place - 100, place)
         time = rows[-1][0]
-        return situation(known, held, recent_bits(reversed(rows), time), self._first + round(time * 1e9))
+        found = track.findings(held, is_end=last >= round(self._duration / self._period) - 1)
+        now = self._first + round(time * 1e9)
+        return situation(known, held, recent_bits(reversed(rows), time), now, findings=found)
 
     def change(self, _label: str, parameter: str, _value: float) -> list[Answer]:
         """A bag cannot be changed.
@@ -253,7 +263,7 @@ def _nodes(bag: Path, types: dict[str, str]) -> list[tuple[NodeView, set[str]]]:
     names = {topic.removesuffix(_CONFIGURATION): topic.removesuffix(_CONFIGURATION) for topic in configured}
     if not names:
         names = {topic: topic for topic, kind in types.items() if kind == ESTIMATE_TYPE}
-    views = [NodeView(name, definitions) for name in names]
+    views = [NodeView(name, definitions, math.inf) for name in names]
     if not configured:
         for view in views:
             view.without_configuration()

@@ -35,7 +35,7 @@ class ReplayResult(NamedTuple):
     def summary(self, *, verified: bool) -> str:
         """One line for a person; ``verified``: about the comparison with the recorded answers."""
         if not verified:
-            return f'{self.velocity_samples} velocity samples replayed'
+            return f'{self.velocity_samples} velocity samples replayed, not compared: --verify compares'
         if self.identical:
             counts = f'{self.recorded_estimates} estimates and {self.recorded_feedforwards} feed-forwards'
             return f'{counts}, identical to the byte'

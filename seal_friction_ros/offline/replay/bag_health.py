@@ -16,6 +16,7 @@ from seal_friction_ros.core.estimation.adaptation import AdaptationState
 from seal_friction_ros.core.estimation.adaptation import learnt as learnt_of
 from seal_friction_ros.core.estimation.compiled_pipeline import Answers
 from seal_friction_ros.core.estimation.configuration import Configuration, Snapshot
+from seal_friction_ros.core.estimation.findings import GOOD, USUAL_LIMITS, Limits
 from seal_friction_ros.core.estimation.friction_filter import PROVEN
 from seal_friction_ros.core.estimation.seal_health import START, Starts, with_sample
 from seal_friction_ros.core.foundation.arrays import FloatArray
@@ -30,6 +31,7 @@ from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS
 from seal_friction_ros.offline.replay.bag_parts import Chosen, try_bags
 from seal_friction_ros.offline.replay.compiled_replay import Run, compile_first, kinds_of_topics
+from seal_friction_ros.offline.replay.run_findings import verdict_in_words
 from seal_friction_ros.offline.work.executor import Workers
 from seal_friction_ros.offline.work.finished_parts import NOWHERE, Kept
 from seal_friction_ros.offline.work.outcome import Outcome
@@ -47,6 +49,9 @@ class BagHealth(NamedTuple):
     noise: float  # [N] standard deviation of the residual at even speed, at the end; NaN if none was seen
     starts: FloatArray  # [-] largest friction of each start after a rest, over the Coulomb friction then
     learnt: AdaptationState | None = None  # at the end; None if the bag has no estimate, or it was not asked for
+    level: str = GOOD  # verdict on the run, if it was asked for
+    why: str = ''
+    next: str = ''
 
 
 def bag_health(
@@ -103,18 +108,21 @@ def health_of_bags(
     workers: Workers = 1,
     kept: Kept = NOWHERE,
     mapping: MappingFile | None = None,
+    limits: Limits = USUAL_LIMITS,
 ) -> list[Outcome[BagHealth]]:
-    """`bag_health` of bags without ``learnt``, ``workers`` of them at a time; outcomes in the order of the bags.
+    """`bag_health` of bags with their verdicts, ``workers`` of them at a time; outcomes in the order of the bags.
 
     The estimator is compiled once before the worker processes begin; a cluster compiles once for each of its workers.
     ValueError: the work folder or the cluster cannot be used.
     """
-    chosen = Chosen(namespace, mapping, override)
+    chosen = Chosen(namespace, mapping, override, limits)
     return try_bags('health', bags, BagHealth, _health, chosen, workers, kept, partial(compile_first, bags, chosen))
 
 
 def _health(bag: Path, chosen: Chosen) -> BagHealth:
-    return bag_health(bag, chosen.namespace, chosen.override, mapping=chosen.mapping)._replace(learnt=None)
+    seen = bag_health(bag, chosen.namespace, chosen.override, mapping=chosen.mapping)
+    level, why, after = verdict_in_words(bag, chosen)
+    return seen._replace(learnt=None, level=level, why=why, next=after)
 
 
 class _Strokes:

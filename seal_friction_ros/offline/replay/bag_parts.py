@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation.configuration import Configuration, first_snapshot, snapshot_text
+from seal_friction_ros.core.estimation.findings import USUAL_LIMITS, Limits
 from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 from seal_friction_ros.offline.work.executor import Workers, nothing
 from seal_friction_ros.offline.work.finished_parts import Kept, Part, keys_of, try_parts
@@ -19,6 +20,7 @@ class Chosen(NamedTuple):
     namespace: str = ''  # as of `open_actuator`
     mapping: MappingFile | None = None  # likewise
     override: Configuration | None = None  # instead of the recorded configuration
+    limits: Limits = USUAL_LIMITS  # of alarms
 
 
 AS_RECORDED = Chosen()
@@ -50,7 +52,7 @@ def try_bags(
         ValueError: The work folder or the cluster cannot be used.
     """
     override, mapping = chosen.override, chosen.mapping
-    known = [chosen.namespace, snapshot_text(first_snapshot(override)) if override else '']
+    known = [chosen.namespace, snapshot_text(first_snapshot(override)) if override else '', repr(chosen.limits)]
     keys = keys_of(kind, bags, list(map(str, bags)), [*known, mapping], workers, kept)
     calls = [partial(_computed, bag, call, chosen) for bag in bags]
     parts = [Part(key, record._fields, one) for key, one in zip(keys, calls, strict=True)]

@@ -18,8 +18,9 @@ from seal_friction_ros.offline.bags.bag import BagError, bag_topics
 from seal_friction_ros.offline.replay.bag_health import bag_health
 from seal_friction_ros.offline.replay.bag_parts import AS_RECORDED, Chosen, try_bags
 from seal_friction_ros.offline.replay.compiled_replay import compile_first
-from seal_friction_ros.offline.replay.health_indicators import UNKNOWN_DAY, Limits, alarms_of, day_of
+from seal_friction_ros.offline.replay.health_indicators import UNKNOWN_DAY, alarms_of, day_of
 from seal_friction_ros.offline.replay.parallel_replay import verify
+from seal_friction_ros.offline.replay.run_findings import verdict_in_words
 from seal_friction_ros.offline.work.executor import Workers
 from seal_friction_ros.offline.work.finished_parts import Kept
 from seal_friction_ros.offline.work.outcome import Outcome
@@ -50,7 +51,9 @@ class BagSummary(NamedTuple):
     offset: float  # [N] of the force sum
     residual: float  # [-] root mean square of the residual while sliding, over the Coulomb friction
     disagreeing: float  # [-] share of the sliding samples with `Status.MODEL_DISAGREES`
-    alarms: str  # of the health of its seals; empty if there is none
+    level: str  # GOOD, LOOK or BAD
+    why: str  # the finding that decides
+    next: str  # what to do
     health: str  # why the health cannot be told; empty if it is
     levels: FloatArray  # shape (n, len(LEVEL_COLUMNS)): a row a pressure level
 
@@ -65,6 +68,7 @@ def bag_summary(bag: Path, chosen: Chosen = AS_RECORDED) -> BagSummary:
         seen, why = None, str(error)
     day = UNKNOWN_DAY if seen is None else day_of(str(bag), seen)
     drift, table = day.break_in, levels.table()
+    verdict = verdict_in_words(bag, chosen, [] if seen is None else alarms_of(day, chosen.limits))
     return BagSummary(
         start=levels.first * 1e-9,
         duration=(levels.last - levels.first) * 1e-9,
@@ -79,7 +83,9 @@ def bag_summary(bag: Path, chosen: Chosen = AS_RECORDED) -> BagSummary:
         offset=day.offset.value,
         residual=_relative_residual(table),
         disagreeing=_mean(table, 'disagreeing'),
-        alarms='; '.join(alarms_of(day, Limits())),
+        level=verdict.level,
+        why=verdict.text,
+        next=verdict.next,
         health=why,
         levels=table,
     )

@@ -1,7 +1,7 @@
 """Comparison of one topic of two bags, paired by stamp: first, largest and root mean square difference."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, astuple, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -24,9 +24,9 @@ class FieldDifference:
     largest: float  # largest magnitude, in the unit of the field; infinite if only one of the two is a number
     rms: float
     outside: int  # number of pairs with a difference outside the tolerance
+    differing: int = 0  # number of pairs with any difference
 
 
-_NO_DIFFERENCE = FieldDifference(0.0, 0.0, 0)
 _Numbers = npt.NDArray[np.int64]
 _Decoded = tuple[bytes, dict[str, Any]]  # bytes and fields of a message
 
@@ -43,6 +43,13 @@ class _Topic(NamedTuple):
         return (message for message in self.read() if message.topic == self.name)
 
 
+_NO_DIFFERENCE = FieldDifference(0.0, 0.0, 0)
+FRICTION_FIELDS = ('state', 'direction', 'coulomb_friction', 'breakaway_force', 'friction_force')
+"""Fields of an estimate that decide by default: not what was learnt, its deviations, and the age of the inputs."""
+COUNTED = ('state', 'direction', 'status', 'limited')
+"""Fields that are no quantities: their differences are counted."""
+
+
 @dataclass(frozen=True)
 class BagComparison:
     """Result of the comparison of two bags."""
@@ -54,10 +61,11 @@ class BagComparison:
     identical_bytes: bool
     first_difference: str  # for a person; empty if no difference is outside the tolerance
     fields: dict[str, FieldDifference]
+    decide: tuple[str, ...]  # fields of which each has to be within its tolerance
 
     @property
     def agree(self) -> bool:
-        """Whether every message has a partner in the other bag, and every field is within tolerance."""
+        """Whether every message has a partner in the other bag, and every field that decides is within tolerance."""
         return not self.first_difference
 
     def numbers(self) -> dict[str, Any]:
@@ -69,11 +77,18 @@ class BagComparison:
         """One line for the topic and one for each field that differs, for a person."""
         result = 'agree' if self.agree else f'differ: {self.first_difference}'
         differing = {name: field for name, field in self.fields.items() if field.largest > 0.0}
+        others = [name for name in differing if name not in self.decide]
         a, b = self.messages_a - self.pairs, self.messages_b - self.pairs
         lonely = f', {a} of the first and {b} of the second without a partner of the same stamp' if a or b else ''
-        fields = (f'{name}: largest {f.largest:.6g}, RMS {f.rms:.6g}' for name, f in differing.items())
+        fields = [self._told(name, f) for name, f in differing.items() if name in self.decide]
+        fields += [f'not compared, and different: {", ".join(others)} (--fields)'] if others else []
         counts = f'{self.messages_a} and {self.messages_b} messages on {self.topic}{lonely}: {result}'
         return '\n'.join([counts, *fields])
+
+    def _told(self, name: str, field: FieldDifference) -> str:
+        if name in COUNTED:
+            return f'{name}: {field.differing} of {self.pairs} differ'
+        return f'{name}: largest {field.largest:.6g}, RMS {field.rms:.6g}'
 
 
 def compare(
@@ -83,6 +98,7 @@ def compare(
     atol: float = 0.0,
     rtol: float = 0.0,
     *,
+    tolerances: Mapping[str, float | None] | None = None,
     namespace: str = '',
     mapping: MappingFile | None = None,
 ) -> BagComparison:
@@ -98,6 +114,8 @@ def compare(
         topic: Topic; by default that of the friction estimates, which may have another name in each bag.
         atol: Absolute tolerance, in the unit of each field.
         rtol: Relative tolerance [-].
+        tolerances: Field that decides -> its absolute tolerance, None: ``atol``. By default `FRICTION_FIELDS` decide
+            on estimates, and all fields on other messages.
         namespace: As of `open_actuator`.
         mapping: Likewise; then the estimates are made here.
 
@@ -113,20 +131,31 @@ def compare(
         raise BagError(f'{bag_a} and {bag_b}: no stamp on {topics} is in both')
     identical, first = True, ''
     totals: dict[str, FieldDifference] = {}  # with the sum of squares instead of the RMS
+    own: dict[str, float | None] = dict(tolerances or {})
     for number, one, other in _decoded_pairs((a, numbers_a), (b, numbers_b)):
         identical = identical and one[0] == other[0]
+        own = own or _usual(one[1])
         for name, value in one[1].items():
-            then = other[1].get(name)
-            difference, within = _difference(value, then, atol, rtol)
-            largest, squares, outside = astuple(totals.get(name, _NO_DIFFERENCE))
-            totals[name] = FieldDifference(max(largest, difference), squares + difference**2, outside + (not within))
-            if not within and not first:
+            then, absolute = other[1].get(name), own.get(name)
+            difference, within = _difference(value, then, atol if absolute is None else absolute, rtol)
+            within = within if name not in COUNTED else value == then
+            largest, squares, outside, differing = astuple(totals.get(name, _NO_DIFFERENCE))
+            sums = (squares + difference**2, outside + (not within), differing + (difference > 0.0))
+            totals[name] = FieldDifference(max(largest, difference), *sums)
+            if not within and not first and name in own:
                 first = f'message {number} at {one[1].get("stamp")} ns: {name} {value!r} -> {then!r}'
     pairs, counts = len(numbers_a), (len(stamps_a), len(stamps_b))
     fields = {name: replace(total, rms=math.sqrt(total.rms / pairs)) for name, total in totals.items()}
     if max(counts) > pairs:
         identical, first = False, first or _first_without_partner(stamps_a, stamps_b, numbers_a, numbers_b)
-    return BagComparison(topics, *counts, pairs, identical, first, fields)
+    if unknown := [name for name in own if name not in fields]:
+        raise BagError(f'{topics}: no field {unknown[0]!r} to compare: there are {", ".join(fields)}')
+    return BagComparison(topics, *counts, pairs, identical, first, fields, tuple(own))
+
+
+def _usual(message: Mapping[str, Any]) -> dict[str, float | None]:
+    """Fields that decide by default."""
+    return dict.fromkeys(FRICTION_FIELDS if set(FRICTION_FIELDS) <= set(message) else message)
 
 
 def _pairs(stamps_a: _Numbers, stamps_b: _Numbers) -> tuple[_Numbers, _Numbers]:

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from seal_friction_ros.core.estimation.findings import BAD, Finding, Limits
 from seal_friction_ros.core.estimation.friction_change import FrictionChange, watch
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
@@ -24,15 +25,6 @@ class Value(NamedTuple):
 
 
 NOT_TOLD = Value(math.nan, math.nan)
-
-
-class Limits(NamedTuple):
-    """Alarm limits (our choice)."""
-
-    scale_low: float = 0.6
-    scale_high: float = 1.5
-    breakaway: float = 2.5  # [-] over Coulomb friction
-    noise: float = 0.3  # [-] over Coulomb friction
 
 
 class Day(NamedTuple):
@@ -123,8 +115,8 @@ def changes_of(seen: Iterable[BagHealth]) -> list[dict[str, float]]:
     return found
 
 
-def alarms_of(day: Day, limits: Limits) -> list[str]:
-    """What is beyond its limit, in words."""
+def alarms_of(day: Day, limits: Limits) -> list[Finding]:
+    """What is beyond its limit, of what was learnt from the reversals."""
     found = []
     low, high = day.scale.value - BAND_95 * day.scale.std, day.scale.value + BAND_95 * day.scale.std
     if low > limits.scale_high or high < limits.scale_low:
@@ -133,4 +125,4 @@ def alarms_of(day: Day, limits: Limits) -> list[str]:
         found.append(f'a start takes {day.breakaway.value:.2f} times the Coulomb friction')
     if day.noise.value > limits.noise * day.friction * max(day.scale.value, 1e-9):
         found.append(f'the residual is {day.noise.value / day.friction:.0%} of the friction')
-    return found
+    return [Finding(BAD, text, 'inspect seals, oil and sensors; after a repair fit again') for text in found]

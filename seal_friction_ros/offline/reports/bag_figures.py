@@ -1,12 +1,13 @@
 """Figures of a bag: the live estimate over time, and measured against estimated friction."""
 
 from collections.abc import Sequence
-from itertools import chain, pairwise
+from itertools import chain, pairwise, repeat
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 
+from seal_friction_ros.core.estimation.strokes import PressureLevel
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import BAR
@@ -14,9 +15,9 @@ from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.messages.records import Status
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun
 from seal_friction_ros.offline.reports import figure_style as style
-from seal_friction_ros.offline.reports.bag_evaluation import BagEvaluation, PressureLevel, worst_level
+from seal_friction_ros.offline.reports.bag_evaluation import BagEvaluation, worst_level
 from seal_friction_ros.offline.reports.figure_style import Plot, finished
-from seal_friction_ros.offline.reports.formatting import force_unit, number, speed_unit
+from seal_friction_ros.offline.reports.formatting import force_unit, speed_unit
 
 STATE_COLOURS = {
     FrictionState.UNKNOWN: style.PURPLE,
@@ -35,6 +36,7 @@ _FAULTS = (
     | Status.VELOCITY_LEAP
 )
 """Status bits of inputs that say nothing about the range of an axis."""
+_COLOURS = (style.BLUE, style.ORANGE, style.GREEN, style.PURPLE, style.VERMILLION)  # of pressures
 _DOTS = 12_000  # in the scatter over velocity
 _MARKS = 3000  # of single strokes over pressure
 
@@ -257,21 +259,21 @@ def pressure_figure(sliding: Sequence[PressureLevel], breakaway: Sequence[Pressu
 
 
 def deviation_figure(levels: Sequence[PressureLevel]) -> Plot:
-    """Deviation of the estimate at each pressure level."""
+    """Deviation of the estimate over time, stroke by stroke, a colour a pressure."""
     figure, ax = style.new_figure(friction_summary(levels), 3.4)
-    shown = [level for level in levels if level.deviation_percent is not None]
-    place = np.arange(len(shown))
-    band = np.array([100.0 * BAND_95 * level.estimated_std / level.measured for level in shown])
-    deviation = np.round([level.deviation_percent or 0.0 for level in shown], 1)
-    ax.bar(place, 2.0 * band, 0.86, bottom=-band, color=style.SKY, alpha=0.3, lw=0, label='95 % band of one reading')
-    bars = ax.bar(place, deviation, 0.5, color=style.BLUE, label='estimated less measured')
-    ax.bar_label(bars, [number(value, 1, signed=True) for value in deviation], padding=3, fontsize=9.0)
-    ax.axhline(0.0, color=style.BLACK, lw=0.8)
-    ax.set_xticks(place, [f'{level.pressure / BAR:.1f}' for level in shown])
-    ax.grid(visible=False, axis='x')
-    largest = 1.2 * max(float(np.abs(deviation).max()), float(band.max()), 1.0) if shown else 1.0
-    limits = {'xlim': (-0.7, max(len(shown), 4) - 0.3), 'ylim': (-largest, largest)}
-    return finished('deviation', figure, ax, xlabel=PRESSURE_LABEL, ylabel='deviation [%]', **limits)
+    bands, ends = [], []
+    for level, colour in zip(levels, chain(_COLOURS, repeat(style.SKY)), strict=False):
+        strokes = sorted((event.time, level.reading(event), event) for event in level.events)
+        known = [(time, 100.0 * (one.estimated / reading - 1.0)) for time, reading, one in strokes if reading > 0.0]
+        bands += [100.0 * BAND_95 * one.std / reading for _, reading, one in strokes if reading > 0.0]
+        ends += [time for time, _ in known]
+        if known:
+            ax.plot(*zip(*known, strict=True), 'o', ms=4.0, color=colour, label=f'{level.pressure / BAR:.1f} bar')
+    if ends:
+        half = np.full(2, np.median(bands))
+        style.fill_band(ax, np.array([min(ends), max(ends)]), 0.0 * half, half, label='95 % band of one reading')
+    style.zero_lines(ax)
+    return finished('deviation', figure, ax, xlabel=TIME_LABEL, ylabel='estimated less measured [%]')
 
 
 def sliding_velocity_figure(run: RecordedRun, levels: Sequence[PressureLevel]) -> Plot:

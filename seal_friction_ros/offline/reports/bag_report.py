@@ -6,17 +6,20 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
-from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING
+from seal_friction_ros.core.estimation import findings, strokes
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
+from seal_friction_ros.core.estimation.findings import GOOD, PLACEHOLDER, verdict_of
+from seal_friction_ros.core.estimation.strokes import PressureLevel
 from seal_friction_ros.core.foundation.documents import parse_json
 from seal_friction_ros.core.foundation.parameters import Meaning, meanings
 from seal_friction_ros.core.foundation.units import BAR, MM, MS, UM
 from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun, read_run
-from seal_friction_ros.offline.reports import bag_evaluation, tracking_evaluation, verdicts
-from seal_friction_ros.offline.reports.bag_evaluation import BagEvaluation, PressureLevel
+from seal_friction_ros.offline.replay import tracking_evaluation
+from seal_friction_ros.offline.replay.run_findings import run_findings
+from seal_friction_ros.offline.replay.tracking_evaluation import TrackingStretch
+from seal_friction_ros.offline.reports import bag_evaluation
+from seal_friction_ros.offline.reports.bag_evaluation import BagEvaluation
 from seal_friction_ros.offline.reports.bag_figures import run_figures
 from seal_friction_ros.offline.reports.figure_style import house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, length_text, number
@@ -30,9 +33,7 @@ from seal_friction_ros.offline.reports.page import (
     table_of,
     write_page,
 )
-from seal_friction_ros.offline.reports.tracking_evaluation import TrackingEvaluation, TrackingStretch
 from seal_friction_ros.offline.reports.tracking_figures import stretch_name, tracking_plots, tracking_summary
-from seal_friction_ros.offline.reports.verdicts import BagNumbers
 
 _FIRST_DATE = 86_400_000_000_000 * 365  # [ns] a stamp before 1971 is no date (our choice)
 _SHOWN_CONFIGURATIONS = 2  # so many of the first and of the last, in a bag with more
@@ -49,7 +50,8 @@ def write_report(bag: Path, out: Path, namespace: str = '', mapping: MappingFile
         mapping: Likewise; then the estimates are made here.
 
     Returns:
-        Files, and as numbers `evaluation_numbers`, ``placeholder_seals`` and ``tracking``, a list of `TrackingStretch`.
+        Files, and as numbers `evaluation_numbers`, the verdict with all findings, ``placeholder_seals`` and
+        ``tracking``, a list of `TrackingStretch`.
 
     Raises:
         BagError: The bag cannot be read, or holds no estimates.
@@ -58,23 +60,25 @@ def write_report(bag: Path, out: Path, namespace: str = '', mapping: MappingFile
     run = read_run(bag, namespace, mapping)
     evaluation, tracking = bag_evaluation.evaluate_run(run), tracking_evaluation.evaluate_tracking(run)
     stretches = tracking.stretches if tracking else ()
-    snapshots = (snapshot for _, _, snapshot in tracking_evaluation.configuration_stretches(run))
-    has_placeholder = any(snapshot is not None and snapshot.configuration.has_placeholder for snapshot in snapshots)
+    found = run_findings(run, evaluation.seen, tracking)
+    verdict = verdict_of(found)
+    # The first is the verdict; a page says the others as remarks.
+    others = [_sentence(one.text) for one in found if one.level != GOOD and _sentence(one.text) != verdict.text]
     figures = write_page(
         out,
         'bag',
         run_figures(run, evaluation) + (tracking_plots(run, tracking) if tracking else []),
-        verdict=verdicts.of_bag(_verdict_numbers(bag, run, evaluation, tracking, has_placeholder)),
+        verdict=verdict._replace(next=verdict.next.replace('BAG', str(bag))),
         head=head_of(f'report {bag}', run.name, data_date(evaluation.start), seals_text(mounted_seals(run))),
         warnings=[
-            *([_sentence(PLACEHOLDER_WARNING)] if has_placeholder else []),
-            *evaluation.friction.notes,
+            *others,
+            *evaluation.notes,
             *(tracking.notes if tracking else ()),
         ],
         run=run,
         evaluation=evaluation,
-        limits=bag_evaluation,
-        verdict_limits=verdicts,
+        limits=strokes,
+        verdict_limits=findings,
         start=datetime.fromtimestamp(evaluation.start // 1_000_000_000, UTC),
         sliding_table=_level_table(evaluation.friction.sliding, 'strokes'),
         breakaway_table=_level_table(evaluation.friction.breakaway, 'starts'),
@@ -86,7 +90,8 @@ def write_report(bag: Path, out: Path, namespace: str = '', mapping: MappingFile
         tracking_table=table_of(stretches, _TRACKING_COLUMNS, (0,)),
         feedforward_table=table_of(stretches, _FEEDFORWARD_COLUMNS),
     )
-    numbers = bag_evaluation.evaluation_numbers(evaluation) | {'placeholder_seals': has_placeholder}
+    numbers = bag_evaluation.evaluation_numbers(evaluation) | {'placeholder_seals': PLACEHOLDER in found}
+    numbers |= {'level': verdict.level, 'verdict': verdict.text, 'findings': [one._asdict() for one in found]}
     return ReportSummary(out, figures, numbers | {'tracking': tracking_evaluation.tracking_numbers(tracking)})
 
 
@@ -105,22 +110,6 @@ def mounted_seals(run: RecordedRun) -> list[str]:
         except (ValueError, LookupError, TypeError):
             return []
     return []
-
-
-def _verdict_numbers(
-    bag: Path, run: RecordedRun, evaluation: BagEvaluation, tracking: TrackingEvaluation | None, has_placeholder: bool
-) -> BagNumbers:
-    sliding, compensated = evaluation.friction.sliding, tracking.compensated if tracking else None
-    return BagNumbers(
-        bag=str(bag),
-        strokes=sum(len(level.events) for level in sliding),
-        in_band=sum(level.in_band for level in sliding),
-        flagged=evaluation.flagged / evaluation.estimates,
-        has_placeholder=has_placeholder,
-        has_reference=bool(np.isfinite(run.reference).any()),
-        tracking=tracking_summary(tracking) if tracking else '',
-        tracking_change=compensated.rms_change if compensated else None,
-    )
 
 
 def _sentence(text: str) -> str:

@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from seal_friction_ros.core.estimation.findings import SMALL_CHANGE, Finding, Verdict, verdict_of
+from seal_friction_ros.core.estimation.strokes import PressureLevel
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import BAR, MM
@@ -15,17 +17,18 @@ from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun, read_run
-from seal_friction_ros.offline.reports import bag_evaluation, tracking_evaluation, verdicts
+from seal_friction_ros.offline.replay import tracking_evaluation
+from seal_friction_ros.offline.replay.run_findings import run_findings
+from seal_friction_ros.offline.replay.tracking_evaluation import TrackingEvaluation
+from seal_friction_ros.offline.reports import bag_evaluation, verdicts
 from seal_friction_ros.offline.reports import figure_style as style
-from seal_friction_ros.offline.reports.bag_evaluation import PressureLevel
 from seal_friction_ros.offline.reports.bag_figures import PRESSURE_LABEL, usable_inputs
 from seal_friction_ros.offline.reports.bag_report import data_date, mounted_seals
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, number
 from seal_friction_ros.offline.reports.page import ReportSummary, Table, head_of, seals_text, write_page
-from seal_friction_ros.offline.reports.tracking_evaluation import TrackingEvaluation
 
-NOISE = verdicts.SMALL_CHANGE  # [-] of a change, where too few strokes tell (our choice)
+NOISE = SMALL_CHANGE  # [-] of a change, where too few strokes tell (our choice)
 SAME_PRESSURE = 0.05  # [-] of the highest pressure, by which pressures of both runs may differ (our choice)
 SEAL_PRESSURES = 11
 _COLOURS = ((style.BLUE, 'o'), (style.ORANGE, 's'))
@@ -52,6 +55,7 @@ class _Run(NamedTuple):
     levels: Sequence[PressureLevel]
     breakaway: Sequence[PressureLevel]
     tracking: TrackingEvaluation | None
+    findings: Sequence[Finding]
 
 
 def is_seal(path: Path) -> bool:
@@ -96,13 +100,18 @@ def _compare_runs(a: Path, b: Path, out: Path, namespace: str, mapping: MappingF
         f'{name}: {data_date(one.run.start)}, {seals_text(mounted_seals(one.run))}'
         for name, one in zip(names, runs, strict=True)
     ]
-    return _write(out, f'compare {a} {b}', names, facts, plots, known, {'sliding': changes, 'breakaway': starts})
+    change = verdicts.of_runs(known, names)
+    between = Finding(change.level, change.text.rstrip('.'), change.next.rstrip('.'))
+    verdict = verdict_of([between, *runs[0].findings, *runs[1].findings])
+    found = {'sliding': changes, 'breakaway': starts}
+    return _write(out, f'compare {a} {b}', names, facts, plots, known, found, verdict)
 
 
 def _read(path: Path, name: str, namespace: str, mapping: MappingFile | None) -> _Run:
     run = read_run(path, namespace, mapping)
-    friction = bag_evaluation.evaluate_run(run).friction
-    return _Run(name, run, friction.sliding, friction.breakaway, tracking_evaluation.evaluate_tracking(run))
+    evaluation, tracking = bag_evaluation.evaluate_run(run), tracking_evaluation.evaluate_tracking(run)
+    found = [one._replace(name=name) for one in run_findings(run, evaluation.seen, tracking)]
+    return _Run(name, run, evaluation.friction.sliding, evaluation.friction.breakaway, tracking, found)
 
 
 def common_changes(before: Sequence[PressureLevel], then: Sequence[PressureLevel]) -> list[Change]:
@@ -214,7 +223,8 @@ def _compare_seals(a: Path, b: Path, out: Path) -> ReportSummary:
     told = [] if not changes else [
         ('Coulomb friction', float(np.mean([one.relative for one in changes])), max(one.noise for one in changes))
     ]  # fmt: skip
-    return _write(out, f'compare {a} {b}', names, [], [plot], told, {'sliding': changes, 'breakaway': []})
+    found: dict[str, list[Change]] = {'sliding': changes, 'breakaway': []}
+    return _write(out, f'compare {a} {b}', names, [], [plot], told, found, verdicts.of_runs(told, names))
 
 
 # -- page -------------------------------------------------------------------------------------------------------------
@@ -228,8 +238,8 @@ def _write(
     plots: Sequence[Plot],
     told: Sequence[tuple[str, float, float]],
     changes: dict[str, list[Change]],
+    verdict: Verdict,
 ) -> ReportSummary:
-    verdict = verdicts.of_runs(told, names)
     tables = {name: _table(names, found) for name, found in changes.items()}
     figures = write_page(
         out, 'comparison', plots, verdict=verdict, head=head_of(command, *facts), names=names, tables=tables, told=told

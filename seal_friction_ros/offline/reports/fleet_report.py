@@ -1,4 +1,4 @@
-"""The page of a fleet: a row per bag, a row per rig, and which of them a person should look at."""
+"""The page of a fleet: which rig drifts, which recording is damaged; a row and a curve a rig, a row a bag."""
 
 import math
 import os
@@ -10,19 +10,21 @@ from urllib.parse import quote
 
 import numpy as np
 
+from seal_friction_ros.core.estimation.findings import BAD, GOOD, LOOK, SMALL_CHANGE, Verdict, worst
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.offline.replay.bag_summary import DIFFERENT, BagSummary
 from seal_friction_ros.offline.replay.health_indicators import NOT_TOLD, Value, trend
 from seal_friction_ros.offline.reports import figure_style as style
-from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
-from seal_friction_ros.offline.reports.page import BAD, GOOD, LOOK, ReportSummary, head_of, script, write_page
+from seal_friction_ros.offline.reports.page import ReportSummary, head_of, script, write_page
 from seal_friction_ros.offline.work.outcome import Outcome
 from seal_friction_ros.offline.work.places import Place
 
-DRIFT = 0.1  # [-] change of the scale within a bag: LOOK above, if it is beyond its 95 % band (our choice)
-DISAGREEING = 0.05  # [-] share of the sliding samples whose friction disagrees with the model: LOOK above (our choice)
 HOURS_A_DAY = 24.0
+FIRST_DATE = 365.0 * 86400.0  # [s] a stamp before 1971 is no date (our choice)
+_COLOURS = (style.VERMILLION, style.BLUE, style.GREEN, style.ORANGE, style.PURPLE, style.SKY)
+_MOST_NAMED = 3  # rigs in the verdict
+FEWEST_BAGS = 4  # with a date, that tell a change of a rig (our choice)
 
 
 class FleetBag(NamedTuple):
@@ -30,7 +32,7 @@ class FleetBag(NamedTuple):
 
     path: Place
     level: str  # GOOD, LOOK or BAD
-    why: str  # empty if GOOD
+    why: str
     summary: BagSummary | None  # None if the recording is damaged
 
 
@@ -38,25 +40,27 @@ class Rig(NamedTuple):
     """The bags of one folder, which count as those of one rig (our choice)."""
 
     name: str
+    level: str  # of its worst bag, or of its change
+    why: str
+    change: float  # [-] of the friction from the bags before ``since`` to those after; NaN: not told
+    since: float  # [s]
     bags: int
     damaged: int
     scale: float  # [-] median over its bags
-    trend: Value  # [1/day] of the scale, over its bags
+    trend: Value  # [1/day] of the scale, over its bags with a date; not told with a deviation above itself
     disagreeing: float  # [-] mean over its bags
 
 
 def judged(path: Place, outcome: Outcome[BagSummary]) -> FleetBag:
-    """A bag with its level and the reasons for it."""
+    """A bag with its level and the reason for it."""
     found = outcome.result
     if found is None:
         return FleetBag(path, BAD, f'damaged: {outcome.error.removeprefix(f"{path}: ")}', None)
-    bad = [f'replay differs: {found.difference}'] * (found.replay == DIFFERENT) + [found.alarms] * bool(found.alarms)
-    look = [f'health not told: {found.health.removeprefix(f"{path}: ")}'] * bool(found.health)
-    if abs(found.drift) > max(DRIFT, BAND_95 * found.drift_std):
-        look.append(f'drifts: friction {found.drift:+.0%} within the bag')
-    if found.disagreeing > DISAGREEING:
-        look.append(f'disagrees with the model in {found.disagreeing:.0%} of the sliding samples')
-    return FleetBag(path, BAD if bad else LOOK if look else GOOD, '; '.join([*bad, *look]), found)
+    if found.replay == DIFFERENT and found.level != BAD:
+        return FleetBag(path, BAD, f'replay differs: {found.difference}', found)
+    if found.health and found.level == GOOD:
+        return FleetBag(path, LOOK, f'health not told: {found.health.removeprefix(f"{path}: ")}', found)
+    return FleetBag(path, found.level, found.why, found)
 
 
 class _Point(NamedTuple):
@@ -67,23 +71,45 @@ class _Point(NamedTuple):
 
 
 def rigs_of(bags: Sequence[FleetBag]) -> list[Rig]:
-    """The folders of the bags, sorted by name."""
+    """The folders of the bags: those whose friction has changed most first, then the worst, then by name."""
     folders: dict[str, list[FleetBag]] = {}
     for bag in bags:
-        path = bag.path
-        folder = str(path.parent) if isinstance(path, Path) else path.rpartition('/')[0]
-        folders.setdefault(folder, []).append(bag)
-    return [_rig(name, of_rig) for name, of_rig in sorted(folders.items())]
+        folders.setdefault(_folder(bag), []).append(bag)
+    rigs = [_rig(name, of_rig) for name, of_rig in sorted(folders.items())]
+    return sorted(rigs, key=lambda rig: (-abs(np.nan_to_num(rig.change)), -_ORDER.index(rig.level)))
+
+
+_ORDER = (GOOD, LOOK, BAD)
+
+
+def _folder(bag: FleetBag) -> str:
+    return str(bag.path.parent) if isinstance(bag.path, Path) else bag.path.rpartition('/')[0]
+
+
+def _points(bags: Sequence[FleetBag]) -> list[_Point]:
+    """Scale of each bag that has one and a date, in order of time."""
+    seen = [bag.summary for bag in bags if bag.summary is not None]
+    points = [_Point(one.start + 0.5 * one.duration, Value(one.scale, one.scale_std)) for one in seen]
+    return sorted(one for one in points if one.time > FIRST_DATE and math.isfinite(one.scale.value))
 
 
 def _rig(name: str, bags: Sequence[FleetBag]) -> Rig:
-    seen = [bag.summary for bag in bags if bag.summary is not None]
-    points = [_Point(one.start + 0.5 * one.duration, Value(one.scale, one.scale_std)) for one in seen]
+    seen, points = [bag.summary for bag in bags if bag.summary is not None], _points(bags)
     slope = trend(points, 'scale') if any(point.scale.std > 0.0 for point in points) else NOT_TOLD
+    slope = slope if abs(slope.value) > slope.std else NOT_TOLD
+    change, since = _change(points)
+    level = worst([bag.level for bag in bags] + ([] if math.isnan(change) else [LOOK]))
+    worst_bags = [bag.why for bag in bags if bag.level == level and level != GOOD]
+    why = [] if math.isnan(change) else [f'friction {change:+.0%} since {_date(since)[:10]}']
+    why += [f'{len(worst_bags)} of {len(bags)} bags {level}: {worst_bags[-1]}'] if worst_bags else []
     scales = [one.scale for one in seen if math.isfinite(one.scale)]
     shares = [one.disagreeing for one in seen if math.isfinite(one.disagreeing)]
     return Rig(
         name,
+        level,
+        '; '.join(why),
+        change,
+        since,
         len(bags),
         len(bags) - len(seen),
         float(np.median(scales)) if scales else math.nan,
@@ -92,14 +118,32 @@ def _rig(name: str, bags: Sequence[FleetBag]) -> Rig:
     )
 
 
+def _change(points: Sequence[_Point]) -> tuple[float, float]:
+    """Relative change of the friction, and the time of the first bag with it; NaN if the bags do not tell one.
+
+    The bags are split where the sum of the deviations from their mean is largest.
+    """
+    if len(points) < FEWEST_BAGS:
+        return math.nan, math.nan
+    scale, std = np.array([one.scale for one in points]).T
+    first = int(np.argmax(np.abs(np.cumsum(scale - scale.mean()))[:-1])) + 1
+    before, then = scale[:first], scale[first:]
+    own = [float(np.hypot(part.std(), np.median(std))) / math.sqrt(len(part)) for part in (before, then)]
+    change = float(then.mean() / before.mean()) - 1.0
+    is_told = abs(change) > max(SMALL_CHANGE, BAND_95 * math.hypot(*own) / float(before.mean()))
+    return (change, points[first].time) if is_told else (math.nan, math.nan)
+
+
 def fleet_numbers(bags: Sequence[FleetBag]) -> dict[str, Any]:
     """Numbers for JSON, without the pressure levels."""
-    counts = {level: sum(bag.level == level for bag in bags) for level in (GOOD, LOOK, BAD)}
+    counts, rigs = {level: sum(bag.level == level for bag in bags) for level in _ORDER}, rigs_of(bags)
+    verdict = _verdict(bags, rigs)
     return {
-        'bags': [{'bag': bag.path, 'level': bag.level, 'why': bag.why, **_plain(bag.summary)} for bag in bags],
+        'level': verdict.level,
+        'verdict': verdict.text,
+        'bags': [{**_plain(bag.summary), 'bag': bag.path, 'level': bag.level, 'why': bag.why} for bag in bags],
         'rigs': [
-            {**rig._asdict(), 'trend': rig.trend.value, 'trend_std': rig.trend.std, 'name': rig.name}
-            for rig in rigs_of(bags)
+            {**rig._asdict(), 'trend': rig.trend.value, 'trend_std': rig.trend.std, 'name': rig.name} for rig in rigs
         ],
         'counts': counts,
         'damaged': sum(bag.summary is None for bag in bags),
@@ -126,8 +170,8 @@ def write_fleet_report(bags: Sequence[FleetBag], where: Path, out: Path) -> Repo
     figures = write_page(
         out,
         'fleet',
-        [_figure(bags)],
-        verdict=verdicts.of_fleet(numbers['counts'], numbers['damaged'], *_worst_names(bags)),
+        [_figure(bags, rigs)],
+        verdict=_verdict(bags, rigs),
         head=head_of('fleet', f'{len(bags)} bags', f'{len(rigs)} folders', str(where)),
         heads=[name for name, *_ in _COLUMNS],
         count=len(bags),
@@ -139,13 +183,21 @@ def write_fleet_report(bags: Sequence[FleetBag], where: Path, out: Path) -> Repo
     return ReportSummary(out, figures, numbers)
 
 
-def _worst_names(bags: Sequence[FleetBag]) -> tuple[str, str]:
-    """Name and reason of the first bad bag, else of the first to look at, else nothing."""
-    for level in (BAD, LOOK):
-        for bag in bags:
-            if bag.level == level:
-                return Path(bag.path).name, bag.why
-    return '', ''
+def _verdict(bags: Sequence[FleetBag], rigs: Sequence[Rig]) -> Verdict:
+    """Verdict on a fleet: by the rig whose friction has changed, else by the worst; damaged bags are counted."""
+    total, level = len(bags), worst(rig.level for rig in rigs)
+    if level == GOOD:
+        said = 'The bag is good.' if total == 1 else f'All {total} bags are good.'
+        return Verdict(GOOD, said, 'nothing; look again after the next recordings.')
+    bad, look = (sum(bag.level == one for bag in bags) for one in (BAD, LOOK))
+    damaged = sum(bag.summary is None for bag in bags)
+    counted = (
+        f'{bad} of {total} {"bag" if total == 1 else "bags"} {"is" if bad == 1 else "are"} bad, {damaged} damaged; '
+    )
+    first = [rig for rig in rigs if not math.isnan(rig.change)][:_MOST_NAMED] or rigs[:1]
+    named = '; '.join(f'{Path(rig.name).name}: {rig.why.rstrip(".")}' for rig in first)
+    text = f'{counted}{look} to look at. {named}.'
+    return Verdict(level, text, 'seal_friction report BAG --out PAGE.html shows a bag in full.')
 
 
 def _date(start: float) -> str:
@@ -160,23 +212,22 @@ def _text(value: float, form: str = '.3g') -> str:
 
 
 _COLUMNS = (
-    ('start (UTC)', 'start', _date),
-    ('duration [s]', 'duration', lambda value: _text(value, '.1f')),
-    ('messages', 'messages', str),
-    ('replay', 'replay', str),
     ('friction / file', 'scale', _text),
     ('drift', 'drift', lambda value: _text(value, '+.1%')),
     ('disagrees', 'disagreeing', lambda value: _text(value, '.1%')),
     ('residual / friction', 'residual', lambda value: _text(value, '.1%')),
+    ('start (UTC)', 'start', _date),
+    ('duration [s]', 'duration', lambda value: _text(value, '.1f')),
+    ('replay', 'replay', str),
     ('offset [N]', 'offset', _text),
     ('reversals', 'reversals', str),
+    ('messages', 'messages', str),
 )
 
 
 def _rows(bags: Sequence[FleetBag], out: Path) -> Iterator[Mapping[str, Any]]:
     """What the template shows of each bag: the worst first, then by path."""
-    order = (BAD, LOOK, GOOD)
-    for bag in sorted(bags, key=lambda bag: (order.index(bag.level), str(bag.path))):
+    for bag in sorted(bags, key=lambda bag: (-_ORDER.index(bag.level), str(bag.path))):
         values = bag.summary
         cells = [('', '') if values is None else _cell(getattr(values, name), show) for _, name, show in _COLUMNS]
         page = _page_of(bag.path, out)
@@ -199,15 +250,17 @@ def _page_of(bag: Place, out: Path) -> str:
     return ''
 
 
-def _figure(bags: Sequence[FleetBag]) -> Plot:
-    """Friction over that of the seal file, bag by bag in order of time."""
-    figure, axes = style.new_figure('Friction over that of the seal file, bag by bag in order of time', 3.4)
-    seen = [(bag, bag.summary) for bag in bags if bag.summary is not None and math.isfinite(bag.summary.scale)]
-    seen.sort(key=lambda pair: (pair[1].start, str(pair[0].path)))
-    for level, colour in ((GOOD, style.GREEN), (LOOK, style.ORANGE), (BAD, style.VERMILLION)):
-        points = [(i, one.scale) for i, (bag, one) in enumerate(seen) if bag.level == level]
+def _figure(bags: Sequence[FleetBag], rigs: Sequence[Rig]) -> Plot:
+    """Friction over that of the seal file, a curve a rig over its dates."""
+    figure, axes = style.new_figure('Friction over that of the seal file, each rig over its dates', 3.4)
+    known = {rig.name: _points([bag for bag in bags if _folder(bag) == rig.name]) for rig in rigs}
+    begin = min((points[0].time for points in known.values() if points), default=0.0)
+    for number, (name, points) in enumerate(known.items()):
         if points:
-            axes.plot(*zip(*points, strict=True), 'o', color=colour, ms=4.0, label=level)
+            days, scales = [(one.time - begin) / 86400.0 for one in points], [one.scale.value for one in points]
+            named = number < len(_COLOURS)
+            look = {'color': _COLOURS[number], 'label': Path(name).name} if named else {}
+            axes.plot(days, scales, 'o-', ms=3.0, lw=1.2, zorder=3.0 - 0.01 * number, **({'color': style.GREY} | look))
     axes.axhline(1.0, color=style.GREY, lw=0.8)
-    axes.set_xlabel('bag, in order of time')
+    axes.set_xlabel(f'days since {_date(begin)[:10]}' if begin else 'no bag has a date')
     return finished('scale', figure, axes, ylabel='friction / seal file [-]')

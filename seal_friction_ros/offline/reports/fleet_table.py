@@ -10,7 +10,7 @@ from seal_friction_ros.offline.reports.fleet_report import FleetBag
 from seal_friction_ros.offline.work.atomic_file import write_whole
 from seal_friction_ros.packages import needed
 
-_TEXTS, _COUNTS = ('replay', 'difference', 'alarms', 'health'), ('messages', 'reversals')
+_TEXTS, _COUNTS = ('replay', 'difference', 'next', 'health'), ('messages', 'reversals')
 
 
 def write_fleet_table(bags: Sequence[FleetBag], out: Path) -> None:
@@ -25,7 +25,7 @@ def write_fleet_table(bags: Sequence[FleetBag], out: Path) -> None:
         ValueError: The file cannot be written.
     """
     arrow, parquet = needed('pyarrow'), needed('pyarrow.parquet')
-    of_bag = [name for name in BagSummary._fields if name != 'levels']
+    of_bag = [name for name in BagSummary._fields if name not in ('levels', 'level', 'why')]
     types = {name: arrow.string() if name in _TEXTS else arrow.float64() for name in of_bag}
     types |= dict.fromkeys(_COUNTS, arrow.int64())
     columns: dict[str, list[Any]] = {name: [] for name in ('bag', 'level', 'why', *of_bag, *_level_names())}

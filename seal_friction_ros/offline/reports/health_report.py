@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from seal_friction_ros.core.estimation.findings import LOOK, Finding, Limits, Verdict, verdict_of
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.offline.replay.bag_health import BagHealth
 from seal_friction_ros.offline.replay.health_indicators import (
     HOUR,
     Day,
-    Limits,
     Value,
     alarms_of,
     changes_of,
@@ -21,7 +21,6 @@ from seal_friction_ros.offline.replay.health_indicators import (
     trend,
 )
 from seal_friction_ros.offline.reports import figure_style as style
-from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.page import ReportSummary, Table, head_of, write_page
 
@@ -53,6 +52,7 @@ def write_health_report(
     trends = {name: trend(days, name) for name in INDICATORS}
     changes = changes_of(seen)
     alarms = {day.name: alarms_of(day, limits) for day in days}
+    verdict = _verdict(days, seen, list(alarms.values()), len(changes))
     numbers: dict[str, Any] = {
         'bags': [
             {
@@ -61,30 +61,52 @@ def write_health_report(
                 'reversals': day.reversals,
                 'friction_N': day.friction * day.scale.value,
                 **{key: getattr(day, name)[i] for name in INDICATORS for i, key in enumerate((name, f'{name}_std'))},
-                'alarms': alarms[day.name],
+                'alarms': [alarm.what for alarm in alarms[day.name]],
+                'level': one.level,
+                'why': one.why,
             }
-            for day in days
+            for day, one in zip(days, seen, strict=True)
         ],
+        'level': verdict.level,
+        'verdict': verdict.text,
         'trends_per_hour': {name: one._asdict() for name, one in trends.items()},
         'changes': changes,
     }
     if out is None:
         return ReportSummary(Path(), (), numbers)
-    said = [f'{name}: {", ".join(texts)}' for name, texts in alarms.items() if texts]
-    rows = [[day.name, day.reversals, *(_text(getattr(day, name)) for name in INDICATORS)] for day in days]
-    table = Table(('bag', 'reversals', *(f'{text} [{unit}]' for text, unit in INDICATORS.values())), rows, (0,))
+    rows = [
+        [day.name, one.level, one.why, day.reversals, *(_text(getattr(day, name)) for name in INDICATORS)]
+        for day, one in zip(days, seen, strict=True)
+    ]
+    heads = ('bag', 'verdict', 'why', 'reversals', *(f'{text} [{unit}]' for text, unit in INDICATORS.values()))
+    table = Table(heads, rows, (0, 1, 2))
     trend_rows = [[text, _text(trends[name]), f'{unit}/h'] for name, (text, unit) in INDICATORS.items()]
     figures = write_page(
         out,
         'health',
         [_figure(seen, changes)],
-        verdict=verdicts.of_health(said, len(changes), sum(day.reversals for day in days)),
+        verdict=verdict,
         head=head_of('health', *([f'{len(days)} bags'] if len(days) > 1 else [days[0].name]), *_dates(days)),
         days=days,
         table=table,
         trends=Table(('indicator', 'change an hour', 'unit'), trend_rows, (0, 2)),
     )
     return ReportSummary(out, figures, numbers)
+
+
+def _verdict(
+    days: Sequence[Day], seen: Sequence[BagHealth], alarms: Sequence[Sequence[Finding]], changes: int
+) -> Verdict:
+    """Verdict by the worst bag, with its name if there are several; a change between the bags is a finding, too."""
+    found = []
+    for day, one, beyond in zip(days, seen, alarms, strict=True):
+        own = Finding(one.level, one.why.rstrip('.'), one.next.rstrip('.'))
+        found += [each._replace(name=day.name if len(days) > 1 else '') for each in (own, *beyond)]
+    if changes:
+        times = 'once' if changes == 1 else f'{changes} times'
+        after = 'find out what was done then; see the dashed lines'
+        found.insert(0, Finding(LOOK, f'the friction has changed {times}', after))
+    return verdict_of(found)
 
 
 def _dates(days: Sequence[Day]) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.stats import binom
 
+from seal_friction_ros.core.estimation.findings import Verdict
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import BAR, MM
@@ -32,7 +33,7 @@ from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import DASH, force_unit, number
-from seal_friction_ros.offline.reports.page import Columns, Table, Verdict, head_of, table_of, write_page
+from seal_friction_ros.offline.reports.page import Columns, Table, head_of, table_of, write_page
 from seal_friction_ros.offline.work.seal_writer import seal_text
 
 PRIOR_ART_SEAL = 'ms28775_114_prior_art'  # the only ring with known charts

@@ -12,6 +12,7 @@ from matplotlib import colormaps
 from matplotlib.collections import PolyCollection
 from matplotlib.patches import Rectangle
 
+from seal_friction_ros.core.estimation.findings import Verdict
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.units import BAR, INCH, LBF, MM, MPA, PSI
 from seal_friction_ros.core.friction.geometry import projected_area, squeeze, stretch
@@ -24,7 +25,7 @@ from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, number, pressure_text
-from seal_friction_ros.offline.reports.page import Table, Verdict, head_of, write_page
+from seal_friction_ros.offline.reports.page import Table, head_of, write_page
 from seal_friction_ros.offline.reports.thesis_data import THESIS_SEAL, ThesisContact, appendix_b
 from seal_friction_ros.offline.reports.uncertainty_tables import uncertainty_values
 

@@ -29,7 +29,6 @@ from seal_friction_ros.offline.work.status import command_line, show_status
 
 TEMPLATES = Path(__file__).with_name('templates')
 MOST_OPEN = 3  # remarks that are not folded
-GOOD, LOOK, BAD = 'good', 'look', 'bad'
 PARAMETER_HEADS = ('parameter', 'value', 'unit', 'meaning')
 Columns = Sequence[tuple[str, Callable[[Any], Any]]]
 """head of each column, and the function that gives its cell of a record"""
@@ -41,14 +40,6 @@ class Table(NamedTuple):
     heads: Sequence[str]
     rows: Sequence[Sequence[Any]]
     text_columns: Sequence[int] = ()  # columns that hold text, which is aligned left; the others hold numbers
-
-
-class Verdict(NamedTuple):
-    """Result of a page in one line; the limits between the levels are our choice."""
-
-    level: str  # GOOD: use it; LOOK: read on first; BAD: do not use it as it is
-    text: str  # with the reason
-    next: str = ''  # what to do
 
 
 class Head(NamedTuple):

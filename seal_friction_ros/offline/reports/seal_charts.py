@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from seal_friction_ros.core.estimation.configuration import PLACEHOLDER
+from seal_friction_ros.core.estimation.findings import Verdict
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import BAR, INCH, LBF, MM, PSI
@@ -32,7 +33,7 @@ from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, number
-from seal_friction_ros.offline.reports.page import Table, Verdict, head_of, write_page
+from seal_friction_ros.offline.reports.page import Table, head_of, write_page
 from seal_friction_ros.offline.reports.thesis_data import (
     THESIS_SEAL,
     dynamic_readings,

@@ -9,10 +9,10 @@ from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.units import MM, UM
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun
+from seal_friction_ros.offline.replay.tracking_evaluation import TrackingEvaluation, TrackingStretch, periodicity
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports.figure_style import Plot, finished
 from seal_friction_ros.offline.reports.formatting import force_unit, length_text, length_unit
-from seal_friction_ros.offline.reports.tracking_evaluation import TrackingEvaluation, TrackingStretch, periodicity
 
 PERIODS = 3  # that are shown
 SHOWN_TIME = 1.0  # [s] of a reference that is not periodic

@@ -3,89 +3,27 @@
 GOOD: the result can be used. LOOK: it can be used once the reason has been looked at. BAD: not as it is.
 """
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
-from seal_friction_ros.core.estimation.friction_change import REFERENCE_REVERSALS
+from seal_friction_ros.core.estimation.findings import (
+    BAD,
+    GOOD,
+    LOOK,
+    NAME_SEALS,
+    SMALL_CHANGE,
+    Verdict,
+    between,
+    in_band,
+    percent,
+    worst,
+)
 from seal_friction_ros.core.foundation.units import BAR, UM
 from seal_friction_ros.offline.reports.formatting import length_text
-from seal_friction_ros.offline.reports.page import BAD, GOOD, LOOK, Verdict
 
-MOST_IN_BAND, FEWEST_IN_BAND = 0.9, 0.5  # [-] of the strokes or readings in the 95 % band: GOOD from, BAD below
-MOST_FLAGGED, FAR_TOO_MANY_FLAGGED = 0.01, 0.1  # [-] of the estimates with a status bit: GOOD up to, BAD above
 SMALL_ERROR, LARGE_ERROR = 0.1, 0.3  # [-] of friction on data left out: GOOD up to, BAD above
 SMALL_NUMERICS, LARGE_NUMERICS = 0.05, 0.15  # [-] change of friction with a coarser step or grid: likewise
-SMALL_CHANGE = 0.1  # [-] between two runs or seals: LOOK above, if the bands tell them apart
 WIDE_BAND = 0.15  # [-] standard deviation of a seal file: LOOK above
-NAME_SEALS = 'name the seal files of your machine (parameter seals); seal_friction seals lists those that there are'
-
-
-def worst(levels: Sequence[str]) -> str:
-    """Worst of some levels; GOOD of none."""
-    return max(levels, key=(GOOD, LOOK, BAD).index, default=GOOD)
-
-
-def between(value: float, good: float, bad: float) -> str:
-    """Level of a number that should be small."""
-    return GOOD if value <= good else BAD if value > bad or not math.isfinite(value) else LOOK
-
-
-def percent(share: float) -> str:
-    """A share as text."""
-    return f'{100.0 * share:.3g} %'
-
-
-class BagNumbers(NamedTuple):
-    """What the verdict on a bag depends on."""
-
-    bag: str
-    strokes: int
-    in_band: int
-    flagged: float  # [-] share of the estimates
-    has_placeholder: bool
-    has_reference: bool
-    tracking: str  # result of the tracking as a sentence, empty without
-    tracking_change: float | None  # [%] of the tracking error with feed-forward
-
-
-def of_bag(numbers: BagNumbers) -> Verdict:
-    """Verdict on the estimates of a bag, and on its loop if it has one."""
-    share = numbers.in_band / numbers.strokes if numbers.strokes else None
-    inside = LOOK if share is None else GOOD if share >= MOST_IN_BAND else BAD if share < FEWEST_IN_BAND else LOOK
-    flags = between(numbers.flagged, MOST_FLAGGED, FAR_TOO_MANY_FLAGGED)
-    loop = BAD if (numbers.tracking_change or 0.0) > 0.0 else GOOD
-    seals = BAD if numbers.has_placeholder else GOOD
-    friction = (
-        'no steady sliding, so the estimate cannot be compared with a measurement'
-        if share is None
-        else f'{numbers.in_band} of {numbers.strokes} measured strokes lie in the 95 % band of the estimate'
-    )
-    parts = [(seals, 'the estimate used the placeholder seal')] if numbers.has_placeholder else []
-    parts += [(loop, numbers.tracking)] if numbers.tracking else []
-    parts += [(inside, friction)]
-    parts += [(flags, f'{percent(numbers.flagged)} of the estimates carry a status bit')] if flags != GOOD else []
-    text = '; '.join(part for level in (BAD, LOOK, GOOD) for at, part in parts if at == level)
-    return Verdict(
-        worst([inside, flags, loop, seals]), f'{text[0].upper()}{text[1:]}.', _after_bag(numbers, inside, flags, loop)
-    )
-
-
-def _after_bag(numbers: BagNumbers, inside: str, flags: str, loop: str) -> str:
-    if numbers.has_placeholder:
-        return f'{NAME_SEALS}.'
-    if loop == BAD:
-        return 'set feedforward.scale to 0, then tune again: seal_friction tune --bag BAG --out feedforward.yaml.'
-    if flags != GOOD:
-        return 'look at the status bits below; docs/degradation.md says what each one means.'
-    if not numbers.strokes:
-        return 'record strokes at even speed in both directions.'
-    if inside != GOOD:
-        command = f'seal_friction identify {numbers.bag} --out my_seal.yaml --report my_seal.html'
-        return f'fit the friction of this machine: {command}.'
-    if numbers.has_reference and numbers.tracking_change is None:
-        return f'tune the feed-forward: seal_friction tune --bag {numbers.bag} --out feedforward.yaml.'
-    return 'nothing: the estimate agrees with the measurement.'
 
 
 class IdentificationNumbers(NamedTuple):
@@ -104,9 +42,13 @@ class IdentificationNumbers(NamedTuple):
 def of_identification(found: IdentificationNumbers) -> Verdict:
     """Verdict on an identified law."""
     error = between(found.error, SMALL_ERROR, LARGE_ERROR)
-    band = GOOD if found.coverage >= MOST_IN_BAND else BAD if found.coverage < FEWEST_IN_BAND else LOOK
     level = worst(
-        [error, band, BAD if found.unsound else GOOD, LOOK if found.outlier or found.changed or found.drifted else GOOD]
+        [
+            error,
+            in_band(found.coverage),
+            BAD if found.unsound else GOOD,
+            LOOK if found.outlier or found.changed or found.drifted else GOOD,
+        ]
     )
     text = (
         f'{found.law}, on readings that the fit did not see: single ones are off by {percent(found.error)} on '
@@ -163,42 +105,6 @@ def of_seal(
     )
     after = 'the band is wide: fit it to readings of your machine (docs/identification.md).' if level == LOOK else ''
     return Verdict(level, text, after or f'use it: seals: [{name}].')
-
-
-def of_health(alarms: Sequence[str], changes: int, reversals: int) -> Verdict:
-    """Verdict on the seals over some bags."""
-    if alarms:
-        return Verdict(BAD, f'Alarm: {"; ".join(alarms)}.', 'inspect seals, oil and sensors; after a repair fit again.')
-    if reversals < REFERENCE_REVERSALS and not changes:
-        seen = f'{reversals or "No"} reversal{"" if reversals == 1 else "s"} to learn from'
-        return Verdict(
-            LOOK,
-            f'{seen}: a change is told from {REFERENCE_REVERSALS} on.',
-            'record more motion in both directions, with a force sum.',
-        )
-    if changes:
-        times = 'once' if changes == 1 else f'{changes} times'
-        return Verdict(LOOK, f'The friction has changed {times}.', 'find out what was done then; see the dashed lines.')
-    return Verdict(GOOD, 'No alarm, and the friction has not changed.', 'nothing; look again after the next runs.')
-
-
-def of_fleet(counts: Mapping[str, int], damaged: int, name: str, why: str) -> Verdict:
-    """Verdict on a fleet.
-
-    Args:
-        counts: Number of bags by level.
-        damaged: Number of bags that cannot be read.
-        name: Of the first bag that is not good; empty if all are.
-        why: It is not good.
-    """
-    total = sum(counts.values())
-    if not name:
-        said = 'The bag is good.' if total == 1 else f'All {total} bags are good.'
-        return Verdict(GOOD, said, 'nothing; look again after the next recordings.')
-    bags, are = 'bag' if total == 1 else 'bags', 'is' if counts[BAD] == 1 else 'are'
-    text = f'{counts[BAD]} of {total} {bags} {are} bad, {damaged} damaged; {counts[LOOK]} to look at. {name}: {why}.'
-    after = 'sort by what you look for; seal_friction report BAG --out PAGE.html shows a bag in full.'
-    return Verdict(BAD if counts[BAD] else LOOK, text, after)
 
 
 def of_tuning(
@@ -310,14 +216,14 @@ def of_runs(changes: Sequence[tuple[str, float, float]], names: tuple[str, str])
     text = '; '.join(f'{what} {100.0 * change:+.1f} % (noise {100.0 * noise:.1f} %)' for what, change, noise in changes)
     told = [abs(change) > noise for _, change, noise in changes]
     if not any(told) and any(noise > LARGE_ERROR for _, _, noise in changes):
-        reason = f'{names[1]} against {names[0]}: {text}: too uncertain to tell a change'
+        reason = f'{text}, from {names[0]} to {names[1]}: too uncertain to tell a change'
         return Verdict(LOOK, f'{reason}.', 'measure both over several strokes at the same pressures.')
     if not any(told):
-        return Verdict(GOOD, f'No change beyond the noise from {names[0]} to {names[1]}: {text}.', 'nothing.')
+        return Verdict(GOOD, f'No change beyond the noise: {text}, from {names[0]} to {names[1]}.', 'nothing.')
     large = any(abs(change) > max(noise, SMALL_CHANGE) for _, change, noise in changes)
     after = (
         'find out what changed: seals, oil, temperature, load; fit again if it stays.'
         if large
         else 'nothing yet; compare the next run.'
     )
-    return Verdict(LOOK, f'{names[1]} against {names[0]}: {text}.', after)
+    return Verdict(LOOK, f'{text}, from {names[0]} to {names[1]}.', after)

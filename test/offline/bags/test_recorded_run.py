@@ -6,6 +6,7 @@ import yaml
 from harness.compensation import compensating
 from harness.example_bags import STEP, rewrite, write_inputs, write_recorded
 
+from seal_friction_ros.core.estimation.strokes import LARGEST_INPUT
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.messages.coder import decode, encode, type_of
 from seal_friction_ros.core.messages.layouts import FORCE_TYPE, POSITION_TYPE, REFERENCE_TYPE, VELOCITY_TYPE
@@ -13,7 +14,7 @@ from seal_friction_ros.core.messages.records import Force, Status, Temperature, 
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.bags.bag import BagError
-from seal_friction_ros.offline.bags.recorded_run import LARGEST_INPUT, read_run
+from seal_friction_ros.offline.bags.recorded_run import read_run
 from seal_friction_ros.offline.replay.replay import chosen_configuration, replay
 
 

@@ -228,7 +228,7 @@ def test_each_tile_has_an_age():
 
 def test_placeholder_seals_are_never_good():
     shown = words(held_of(*RECORDS), known=PLACEHOLDER)
-    assert shown['verdict'] == 'look'
+    assert shown['verdict'] == 'bad'
     assert 'placeholder' in shown['reason']
 
 

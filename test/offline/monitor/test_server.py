@@ -289,6 +289,16 @@ def test_off_without_an_estimator_is_not_confirmed():
     assert answer == {'confirmed': False, 'text': 'NOT OFF: no estimator is known; one that comes is set to 0'}
 
 
+def test_an_off_that_is_lost_decides_the_verdict_until_it_is_lifted():
+    view = view_of(change=lambda _: [Answer(False, 'NOT OFF: /estimator says no')])
+    view.off()
+    lost = view.view('', -1.0)['now']
+    view.lift()
+    lifted = view.view('', -1.0)['now']
+    assert (lost['verdict'], lost['reason']) == ('bad', 'NOT OFF: /estimator says no')
+    assert 'NOT OFF' not in lifted['reason']
+
+
 def test_a_change_reaches_the_parameter_of_the_actuator():
     asked: list[Any] = []
     with served(view_of(change=lambda wanted: asked.append(wanted) or [Answer(True, 'yes')])) as server:

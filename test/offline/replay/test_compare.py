@@ -10,7 +10,7 @@ from harness.compensation import compensating
 from harness.example_bags import STEP, rewrite, write_recorded
 from paths import ROOT
 
-from seal_friction_ros.core.messages.coder import DECODERS
+from seal_friction_ros.core.messages.coder import DECODERS, encode
 from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, ESTIMATE_TYPE
 from seal_friction_ros.offline.bags.bag import BagMessage, bag_topics, read_messages
 from seal_friction_ros.offline.commands.main import main
@@ -30,6 +30,30 @@ def test_compare_says_first_largest_and_rms_difference(tmp_path: Path, capsys):
     assert 0.0 < coulomb['rms'] <= coulomb['largest'] < 1.0
     assert coulomb['outside'] == found['messages_a'] == 900
     assert found['fields']['stamp']['largest'] == 0.0
+
+
+def test_what_was_learnt_does_not_decide_unless_it_is_named(tmp_path: Path, capsys):
+    """Another deviation and another age of the inputs are no other friction; states are counted."""
+    counter = iter(range(10_000))
+
+    def changed(_: int, message: BagMessage) -> BagMessage:
+        if message.type_name != ESTIMATE_TYPE:
+            return message
+        record = DECODERS[ESTIMATE_TYPE](message.data)
+        state = record.state if next(counter) >= 12 else (record.state + 1) % 3
+        data = encode(record._replace(adaptation_scale=0.5, input_age=1.0, state=state), b'rod')
+        return message._replace(data=data)
+
+    other = rewrite(Path(PULL_TEST), tmp_path / 'other', changed)
+    assert main(['compare', PULL_TEST, str(other)]) == 1
+    said = capsys.readouterr().out
+    assert 'state: 12 of 900 differ' in said
+    assert 'not compared, and different: input_age, adaptation_scale (--fields)' in said
+    assert main(['compare', PULL_TEST, str(other), '--fields', 'friction_force', 'breakaway_force']) == 0
+    assert main(['compare', PULL_TEST, str(other), '--fields', 'input_age']) == 1
+    assert main(['compare', PULL_TEST, str(other), '--fields', 'input_age=2', 'adaptation_scale=2']) == 0
+    assert main(['compare', PULL_TEST, str(other), '--fields', 'fiction']) == 2
+    assert main(['compare', PULL_TEST, str(other), '--fields', 'state=x']) == 2
 
 
 def compared(first: str | Path, second: str | Path, capsys, *options: str) -> dict:

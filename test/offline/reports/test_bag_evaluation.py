@@ -4,12 +4,14 @@ import dataclasses
 import json
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from seal_friction_ros.core.estimation.configuration import SealSelection, first_snapshot, snapshot_text
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
+from seal_friction_ros.core.estimation.strokes import Event, offset_of_strokes, pressure_labels
 from seal_friction_ros.core.friction.actuator import actuator_friction
 from seal_friction_ros.core.messages.coder import encode, encode_text
 from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, FORCE_TYPE, PRESSURE_TYPE, VELOCITY_TYPE
@@ -19,14 +21,7 @@ from seal_friction_ros.offline.bags import bag as bags
 from seal_friction_ros.offline.bags.bag import BagWriter
 from seal_friction_ros.offline.bags.recorded_run import read_run
 from seal_friction_ros.offline.replay.replay import replay
-from seal_friction_ros.offline.reports.bag_evaluation import (
-    Event,
-    evaluate_run,
-    evaluation_numbers,
-    friction_by_pressure,
-    offset_of_strokes,
-    pressure_labels,
-)
+from seal_friction_ros.offline.reports.bag_evaluation import BagEvaluation, evaluate_run, evaluation_numbers
 
 START = 1_700_000_000_123_456_789  # [ns]
 RATE = 200  # [Hz]
@@ -69,7 +64,12 @@ def make_bag(folder: Path, rows) -> Path:
 
 
 def evaluated(folder: Path, rows):
-    return friction_by_pressure(read_run(make_bag(folder, rows)))
+    return friction_of(evaluate_run(read_run(make_bag(folder, rows))))
+
+
+def friction_of(found: BagEvaluation) -> SimpleNamespace:
+    """The comparison with the notes on it."""
+    return SimpleNamespace(**vars(found.friction), notes=found.notes)
 
 
 @pytest.mark.parametrize('error', [1.0, 0.8])
@@ -208,12 +208,12 @@ def test_inputs_that_are_no_numbers_are_left_out_and_counted(tmp_path):
         broken[i % 3] = (math.nan, math.inf)[i % 2]
         rows[i] = tuple(broken)
     run = read_run(make_bag(tmp_path, rows))
-    result = friction_by_pressure(run)
+    result = friction_of(evaluate_run(run))
     for level, pressure in zip(result.sliding, LEVELS, strict=True):
         friction = actuator_friction(SEALS, pressure, pressure).coulomb_friction
         assert level.measured == pytest.approx(friction, rel=1e-6)
         assert len(level.events) == 2  # a lost velocity does not cut a stroke in two
-    assert any('unusable inputs' in note for note in result.notes)
+    assert any('not finite) are left out' in note for note in result.notes)
     counts = evaluate_run(run).status_counts
     for bit in ('VELOCITY_NOT_FINITE', 'PRESSURE_NOT_FINITE', 'FORCE_NOT_FINITE'):
         assert counts[bit] > 0

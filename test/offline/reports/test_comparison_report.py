@@ -6,9 +6,9 @@ import pytest
 from harness.report_page import checked_page
 from paths import ROOT
 
+from seal_friction_ros.core.estimation.findings import GOOD, LOOK
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.reports.comparison_report import common_changes, mean_change, write_comparison
-from seal_friction_ros.offline.reports.page import GOOD, LOOK
 
 PULL_TEST = ROOT / 'bags' / 'pull_test'
 
@@ -25,7 +25,7 @@ def test_a_run_has_not_changed_against_itself(tmp_path: Path):
 def test_charts_of_the_prior_art_are_above_the_law_of_the_tests(tmp_path: Path, capsys):
     page = tmp_path / 'page.html'
     assert main(['compare', 'ms28775_114', 'ms28775_114_prior_art', '--out', str(page)]) == 0
-    assert 'ms28775_114_prior_art against ms28775_114' in capsys.readouterr().out
+    assert 'from ms28775_114 to ms28775_114_prior_art' in capsys.readouterr().out
     rows = checked_page(page).table('pressure [bar]')
     assert len(rows) == 11
     assert all(row['change [%]'].startswith('+') for row in rows)

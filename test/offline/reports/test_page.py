@@ -8,20 +8,18 @@ from jinja2 import UndefinedError
 from matplotlib.figure import Figure
 from paths import ROOT
 
+from seal_friction_ros.core.estimation.findings import GOOD, LOOK, Verdict
 from seal_friction_ros.core.servo.motions import Sine
 from seal_friction_ros.files import package_version
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.reports import page as kit
 from seal_friction_ros.offline.reports.figure_style import Plot, house_style, new_figure
 from seal_friction_ros.offline.reports.page import (
-    GOOD,
-    LOOK,
     MOST_OPEN,
     PARAMETER_HEADS,
     TEMPLATES,
     Head,
     Table,
-    Verdict,
     environment,
     parameter_rows,
     render_page,

@@ -2,33 +2,10 @@
 
 import pytest
 
+from seal_friction_ros.core.estimation.findings import BAD, GOOD, LOOK
 from seal_friction_ros.offline.reports import verdicts
-from seal_friction_ros.offline.reports.page import BAD, GOOD, LOOK
 
-BAG = verdicts.BagNumbers('bag', 20, 20, 0.0, False, False, '', None)
 LAW = verdicts.IdentificationNumbers('law', 0.05, 0.08, 0.95, '', False, False, False)
-
-
-@pytest.mark.parametrize(
-    ('changed', 'level', 'words'),
-    [
-        ({}, GOOD, '20 of 20'),
-        ({'in_band': 18}, GOOD, '18 of 20'),
-        ({'in_band': 17}, LOOK, 'identify bag'),
-        ({'in_band': 9}, BAD, '9 of 20'),
-        ({'strokes': 0, 'in_band': 0}, LOOK, 'No steady sliding'),
-        ({'flagged': 0.011}, LOOK, '1.1 %'),
-        ({'flagged': 0.2}, BAD, 'status bits'),
-        ({'has_placeholder': True}, BAD, 'The estimate used the placeholder seal'),
-        ({'has_reference': True}, GOOD, 'tune --bag bag'),
-        ({'tracking': 'error cut', 'tracking_change': -80.0}, GOOD, 'Error cut; 20 of 20'),
-        ({'tracking': 'error raised', 'tracking_change': 5.0}, BAD, 'Error raised; 20 of 20'),
-    ],
-)
-def test_a_bag_is_judged_by_band_flags_seals_and_loop(changed, level, words):
-    verdict = verdicts.of_bag(BAG._replace(**changed))
-    assert verdict.level == level
-    assert words in f'{verdict.text} {verdict.next}'
 
 
 @pytest.mark.parametrize(
@@ -57,14 +34,6 @@ def test_a_moving_mass_that_no_machine_has_is_an_alarm(mass):
     assert verdict.level == BAD
     assert f'{mass:.3g} kg' in verdict.text
     assert verdicts.of_tuning('better', mass=0.4, **given).level == LOOK
-
-
-def test_an_alarm_is_worse_than_a_change_and_that_than_none():
-    assert verdicts.of_health(['monday: friction'], 1, 50).level == BAD
-    assert verdicts.of_health([], 1, 50).level == LOOK
-    assert verdicts.of_health([], 0, 0).level == LOOK
-    assert verdicts.of_health([], 0, 3).level == LOOK  # too few to tell
-    assert verdicts.of_health([], 0, 50).level == GOOD
 
 
 def test_a_change_within_the_noise_is_no_change():

@@ -22,4 +22,9 @@
       table.tBodies[0].append(...rows.map(([, row]) => row));
     }));
   }
+  const filter = document.querySelector('input.filter');
+  filter.addEventListener('input', () => {
+    const wanted = filter.value.toLowerCase();
+    for (const row of document.querySelector('table.filtered').tBodies[0].rows) row.hidden = !row.textContent.toLowerCase().includes(wanted);
+  });
 })();

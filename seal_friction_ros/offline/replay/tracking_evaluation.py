@@ -15,10 +15,11 @@ import numpy as np
 from seal_friction_ros.core.estimation.configuration import Snapshot, parse_snapshot
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.core.estimation.strokes import MAX_GAP
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.servo.tracking import dwell_per_reversal, reversals, tracking_peak, tracking_rms
-from seal_friction_ros.offline.bags.recorded_run import MAX_GAP, RecordedRun
+from seal_friction_ros.offline.bags.recorded_run import RecordedRun
 
 SETTLING_TIME = 0.5  # [s] left out after a change, in addition to fade_time: the simulated servo settles in 0.1 s
 MIN_SAMPLES = 50  # a shorter stretch is not evaluated

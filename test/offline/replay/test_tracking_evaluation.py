@@ -17,8 +17,7 @@ from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, FEEDFORW
 from seal_friction_ros.core.servo.motions import Chirp, Sine
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun, read_run
 from seal_friction_ros.offline.replay.replay import replay
-from seal_friction_ros.offline.reports.figure_style import house_style
-from seal_friction_ros.offline.reports.tracking_evaluation import (
+from seal_friction_ros.offline.replay.tracking_evaluation import (
     MIN_SAMPLES,
     SETTLING_TIME,
     configuration_stretches,
@@ -26,6 +25,7 @@ from seal_friction_ros.offline.reports.tracking_evaluation import (
     periodicity,
     tracking_numbers,
 )
+from seal_friction_ros.offline.reports.figure_style import house_style
 from seal_friction_ros.offline.reports.tracking_figures import shown_part, tracking_plots, tracking_summary
 
 RATE = 1000  # [Hz]
