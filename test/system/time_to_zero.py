@@ -11,8 +11,9 @@ request or signal, until 0 N is received for good; at most `LONGEST`. Run it at 
 The middleware may deliver late what the node has sent in time (docs/degradation.md). So the time is also that of a
 controller which takes no message older than `OLDEST`, as docs/controllers.md asks.
 
-Time counts from SIGCONT where a node was stopped: until then nobody can act. A force against the wanted velocity, a
-node that starts where it must not, and a force from placeholder seals count as infinite.
+Time counts from SIGCONT where a node was stopped: until then nobody can act. If the machine goes on meanwhile, it
+counts until the last force from an input that is older than `OLDEST`; a force in time may go on. A force against the
+wanted velocity, a node that starts where it must not, and a force from placeholder seals count as infinite.
 
 Alternating stamps stay usable. There the requirement is that a reversal is not faster than the slew limit.
 """
@@ -80,6 +81,7 @@ LONGEST = FeedForwardSettings().fade_time + 0.05  # [s]
 QUIET = 0.3  # [s] 0 N for good
 LONGEST_WAIT = 5.0  # [s] for it
 OLDEST = 50 * MS  # [ns] message that a controller takes
+HANDSHAKE = 0.3  # [s] until a request to a new service is heard at once
 SLOW_SLEW = 500.0  # [N/s] where stamps alternate
 JITTER = 0.01  # [s] of the receipt
 NEVER_ZERO = float('inf')  # [s]
@@ -305,8 +307,9 @@ def axis(
         folder, profile = Path(name), share_directory('seal_friction_ros', __file__) / 'config' / 'fastdds.xml'
         text = profile.read_text().replace('<sec>2</sec>', ANNOUNCED).replace(LEASE, lease)
         (folder / 'fastdds.xml').write_text(text)
+        set_up_discovery()
+        stack.callback(os.environ.update, {PROFILES[0]: os.environ[PROFILES[0]]})
         os.environ[PROFILES[0]] = str(folder / 'fastdds.xml')
-        stack.callback(os.environ.pop, PROFILES[0])
         made = Axis(stack.enter_context(ros_context(domain)), folder, domain, parameters or {}, topics)
         stack.callback(made.close)
         yield made
@@ -351,7 +354,8 @@ def signalled(number: signal.Signals) -> Callable[[Axis], TimeToZero]:
 
 
 def deactivated(place: Axis) -> TimeToZero:
-    """The node is deactivated."""
+    """The node is deactivated; it hears the first request to a service only a heartbeat after it is there."""
+    place.spin(HANDSHAKE)
     start = time.monotonic_ns()
     place.change_state(Transition.TRANSITION_DEACTIVATE)
     found = place.time_to_zero(lambda: start)
@@ -398,9 +402,10 @@ def stopped(seconds: float, *, goes_on: bool) -> Callable[[Axis], TimeToZero]:
         place.node.send_signal(signal.SIGCONT)
         if not goes_on:
             return place.time_to_zero(lambda: start)
-        place.spin_until(lambda: any(one.force == 0.0 for one in place.received), LONGEST_WAIT)
-        zeros = [one.time for one in place.received if one.force == 0.0]
-        found = (zeros[0] - start) * 1e-9 if zeros else NEVER_ZERO
+        end = start + round((LONGEST + QUIET) * 1e9)
+        place.spin_until(lambda: place.received and place.received[-1].time > end, LONGEST_WAIT)
+        late = [one.time for one in place.received if one.force != 0.0 and one.time - one.stamp > OLDEST]
+        found = (max(late, default=start) - start) * 1e-9 if place.received else NEVER_ZERO
         return TimeToZero(found, found)
 
     return attempt
