@@ -286,7 +286,7 @@ class EstimatorNode(ManagedNode):
             self._on_malformed(name, error)
             self._look_after_timers(began)
             return
-        received, before = time.monotonic_ns() + self._receipt_offset, self._state  # `now`: a call less
+        received, before = self.now(), self._state
         sent = received - lateness if received > lateness else 0
         if self._sent:
             self._sent.clear()

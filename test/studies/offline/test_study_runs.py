@@ -110,6 +110,7 @@ def test_every_script_of_the_page_is_one():
         'bench/ehl.py',
         'test/studies/lubrication_findings.py',
         'test/system/oring_map.py',
+        'test/system/speed_on_logs.py',
         'test/studies/seal_bodies.py',
         'test/system/uncertain_grid.py',
     }
