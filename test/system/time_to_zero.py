@@ -469,6 +469,7 @@ def started(values: dict[str, Any], *, runs: bool) -> Callable[[Axis], TimeToZer
 
     def attempt(place: Axis) -> TimeToZero:
         place.kill_node()
+        place.spin(QUIET)  # until its last forces have come
         place.received.clear()
         log = place.folder / 'wrong'
         with node_process('friction_estimator', place.domain, {**NODE, **values}, log) as process:
