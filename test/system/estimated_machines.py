@@ -6,6 +6,7 @@ With the load in the force sum, and without a load cell: then a load of the cyli
 Exit code 1 if the friction with ``on`` is off by more than `MOST` times as much as with ``off``.
 """
 
+import itertools
 import sys
 import tempfile
 from pathlib import Path
@@ -55,17 +56,21 @@ def estimated(log: Recording, seals: EstimatorParameters, mode: str, has_load: b
     return np.array(found)
 
 
-def score(machine: Machine, day: float, has_load: bool, seed: int, folder: Path) -> Score | None:
-    """Identify with one recording, estimate along another; None: identification refuses the first."""
+def identified(machine: Machine, seed: int, folder: Path) -> EstimatorParameters | None:
+    """Seals by the first recording; None: identification refuses it."""
     first = record(machine, machine.supplies, (0.02, 0.08), (0.0, 0.4), seed)
-    others = 0.5 * (np.array(machine.supplies[1:]) + np.array(machine.supplies[:-1]))
-    changed = machine._replace(run_in=0.0, friction=lambda *of: day * machine.friction(*of))
-    second = record(changed, others.tolist(), (0.03, 0.06, 0.12), (0.1, 0.5), seed + 1)
     run = Run(folder, *write_log(first, folder, 'first', seed), *WAYS['one'], '--run-to-run', '0')
     if run.code:
         return None
     selection = SealSelection((str(run.out),), ('mounting',))
-    seals = load_configuration(selection, EstimatorSettings()).parameters().estimator
+    return load_configuration(selection, EstimatorSettings()).parameters().estimator
+
+
+def score(machine: Machine, seals: EstimatorParameters, day: float, has_load: bool, seed: int) -> Score:
+    """Estimate along a second recording."""
+    others = 0.5 * (np.array(machine.supplies[1:]) + np.array(machine.supplies[:-1]))
+    changed = machine._replace(run_in=0.0, friction=lambda *of: day * machine.friction(*of))
+    second = record(changed, others.tolist(), (0.03, 0.06, 0.12), (0.1, 0.5), seed + 1)
     moving = second.velocity != 0.0
     truth = second.friction[moving]
     off, on = (estimated(second, seals, mode, has_load)[moving] for mode in ('off', 'on'))
@@ -84,14 +89,13 @@ def main() -> int:
     options = parser.parse_args()
     rows, bad = {}, 0
     for machine in (m for m in MACHINES if options.only in m.name):
-        for day in DAYS:
-            for has_load in (True, False):
-                with tempfile.TemporaryDirectory() as folder:
-                    found = score(machine, day, has_load, options.seed, Path(folder))
-                name = f'{machine.name}, {day:g}' + ('' if has_load else ', no load cell')
-                rows[name] = found._asdict() if found else {}
-                bad += found is not None and found.on > MOST * max(found.off, NOISE)
-    tell_tables({'friction, RMS over the true one': rows}, options.json)
+        with tempfile.TemporaryDirectory() as folder:
+            seals = identified(machine, options.seed, Path(folder))
+        for day, has_load in itertools.product(DAYS if seals else (), (True, False)):
+            found = score(machine, seals, day, has_load, options.seed)
+            rows[f'{machine.name}, {day:g}' + ('' if has_load else ', no load cell')] = found._asdict()
+            bad += found.on > MOST * max(found.off, NOISE)
+    tell_tables({'friction, RMS over the true one': rows}, as_json=options.json)
     return 1 if bad else 0
 
 
