@@ -26,7 +26,7 @@ node = Node('subscriber')
 node.create_subscription(Float64, 'topic', lambda message: print(message.data, flush=True), 100)
 rclpy.spin(node)
 """
-MORE_THAN_FIT = 1000  # messages; the shared memory of Fast DDS holds 512 for a subscriber
+MORE_THAN_FIT = 1000  # messages; more than wait in the socket of a subscriber
 OTHERS = 90  # participants whose ports are taken: the next ones get numbers beyond
 
 

@@ -81,14 +81,20 @@ def _middleware(environment: Mapping[str, str]) -> Iterator[Finding]:
     if not given:
         own = 'config/fastdds.xml, set by the nodes'
         without = f'none: nodes may find each other 3 s late; export {PROFILES[0]}=.../config/fastdds.xml'
-        from_wheels = 'ROS_DISTRO' not in environment
-        yield Finding(Level.OK if from_wheels else Level.NOTE, 'profile', own if from_wheels else without)
+        is_own = _has_own_profile(environment)
+        yield Finding(Level.OK if is_own else Level.NOTE, 'profile', own if is_own else without)
     default = 'SUBNET' if 'ROS_DISTRO' in environment else 'LOCALHOST'
     reach = environment.get('ROS_AUTOMATIC_DISCOVERY_RANGE', default)
     where = {'LOCALHOST': 'nodes of this computer', 'OFF': 'no other node', 'SUBNET': 'every computer of the network'}
     text = f'{reach}: {where.get(reach, "not a range: use SUBNET, LOCALHOST, OFF or SYSTEM_DEFAULT")}'
     level = Level.OK if reach in (*where, 'SYSTEM_DEFAULT') else Level.FAULT
     yield Finding(level, 'discovery range', f'{text}; domain {_domain(environment)}')
+
+
+def _has_own_profile(environment: Mapping[str, str]) -> bool:
+    """Whether the nodes set the profile of this package: from wheels, for this computer, if there is no other one."""
+    is_local = environment.get('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST') == 'LOCALHOST'
+    return is_local and 'ROS_DISTRO' not in environment and not any(map(environment.get, PROFILES))
 
 
 def _domain(environment: Mapping[str, str]) -> int:
@@ -105,8 +111,7 @@ def _participants(environment: Mapping[str, str], udp: Path) -> Finding:
     except OSError as error:
         return Finding(Level.NOTE, 'participants', f'not known: {error.strerror}')
     numbers = [number for number, port in enumerate(ports) if port in used]
-    own_profile = 'ROS_DISTRO' not in environment and not any(map(environment.get, PROFILES))
-    most = _ANNOUNCED_TO['profile' if own_profile else 'rclpy']
+    most = _ANNOUNCED_TO['profile' if _has_own_profile(environment) else 'rclpy']
     if max(numbers, default=0) >= most:
         text = f'{len(numbers)}, the highest has number {max(numbers)}: nodes from number {most} on are not discovered'
         return Finding(Level.FAULT, 'participants', f'{text}: stop some, or use another ROS_DOMAIN_ID')
@@ -114,15 +119,15 @@ def _participants(environment: Mapping[str, str], udp: Path) -> Finding:
 
 
 def _shared_memory(environment: Mapping[str, str]) -> Finding:
-    if 'ROS_DISTRO' not in environment and not any(map(environment.get, PROFILES)):
+    if _has_own_profile(environment):
         return Finding(Level.OK, 'shared memory', 'not used: config/fastdds.xml has UDP alone')
     if not os.access(SHARED_MEMORY, os.W_OK):
         return Finding(Level.NOTE, 'shared memory', f'{SHARED_MEMORY} cannot be written: Fast DDS falls back to UDP')
     free = shutil.disk_usage(SHARED_MEMORY).free
-    files = len(list(SHARED_MEMORY.glob('fastrtps_*')))
+    files = sum(len(list(SHARED_MEMORY.glob(name))) for name in ('fastrtps_*', 'fastdds_*'))  # Jazzy, Kilted
     text = f'{free >> 20} MiB free, {files} files of Fast DDS'
     if free < SMALLEST_SHARED_MEMORY:
-        return Finding(Level.NOTE, 'shared memory', f'{text}: with no node running, remove {SHARED_MEMORY}/fastrtps_*')
+        return Finding(Level.NOTE, 'shared memory', f'{text}: with no node running, remove {SHARED_MEMORY}/fast*_*')
     return Finding(Level.OK, 'shared memory', text)
 
 

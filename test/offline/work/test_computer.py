@@ -42,6 +42,7 @@ def test_the_profile_is_looked_for(tmp_path: Path):
     assert 'gone.xml' in text
     assert about('profile', {})[0] is Level.OK
     assert about('profile', {'ROS_DISTRO': 'jazzy'})[0] is Level.NOTE
+    assert about('profile', {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'})[0] is Level.NOTE
 
 
 @pytest.mark.parametrize(
@@ -77,12 +78,14 @@ def test_participants_are_counted_by_their_ports_in_the_domain():
 def test_a_small_shared_memory_is_noted(monkeypatch, tmp_path: Path):
     monkeypatch.setattr(computer, 'SHARED_MEMORY', tmp_path)
     (tmp_path / 'fastrtps_1').touch()
+    (tmp_path / 'fastdds_1').touch()
     level, text = about('shared memory', {'ROS_DISTRO': 'jazzy'})
     assert level is Level.OK
-    assert text.endswith(' MiB free, 1 files of Fast DDS')
+    assert text.endswith(' MiB free, 2 files of Fast DDS')
     monkeypatch.setattr(computer, 'SMALLEST_SHARED_MEMORY', 1 << 62)
     assert about('shared memory', {'ROS_DISTRO': 'jazzy'})[0] is Level.NOTE
     assert 'not used' in about('shared memory', {})[1]
+    assert 'not used' not in about('shared memory', {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'})[1]
 
 
 def test_the_priority_is_what_a_process_gets(monkeypatch):
