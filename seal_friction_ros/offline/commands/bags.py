@@ -134,7 +134,7 @@ def _tolerance(text: str) -> tuple[str, float | None]:
     try:
         return name, cli.non_negative(value) if has_tolerance else None
     except (ValueError, argparse.ArgumentTypeError) as error:
-        raise ValueError(f'--fields {text}: {error}') from None
+        raise ValueError(f'--fields {text}: {error}; give FIELD or FIELD=TOLERANCE') from None
 
 
 def run_recover(arguments: argparse.Namespace) -> int:
