@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from functools import partial
 from operator import itemgetter
-from typing import Any
+from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
@@ -78,6 +78,14 @@ _TOPIC_OF = {type_name: topic for topic, type_name in OUTPUTS.items()}
 def _lateness(source: int) -> int:
     """Time [ns] since a message was sent at ``source`` [ns of the system clock]; 0 if the middleware does not tell."""
     return time.time_ns() - source if source else 0
+
+
+class _Counted(NamedTuple):
+    """An input, and who counts its messages."""
+
+    plan: TopicPlan
+    type_name: str
+    listeners: list[EstimatorDiagnostics]
 
 
 class EstimatorNode(ManagedNode):
@@ -218,7 +226,10 @@ class EstimatorNode(ManagedNode):
             for number, actuator in enumerate(self._file.actuators)
         }
         every = list(self._statistics.values())
-        self._listeners = {topic: [every[number] for number, _ in self._plans[topic].taken] for topic in self._types}
+        self._counted = {
+            topic: _Counted(self._plans[topic], type_name, [every[number] for number, _ in self._plans[topic].taken])
+            for topic, type_name in self._types.items()
+        }
         self._lowest = [Lowest() for _ in every]
 
     def start(self) -> None:
@@ -279,29 +290,29 @@ class EstimatorNode(ManagedNode):
         began = time.perf_counter_ns()
         if not self.active:
             return
-        plan = self._plans[name]
+        plan, type_name, listeners = self._counted[name]
         try:
             message = plan.read(data)
         except ValueError as error:
             self._on_malformed(name, error)
             self._look_after_timers(began)
             return
-        received, before = self.now(), self._state
+        received, before = time.monotonic_ns() + self._receipt_offset, self._state
         sent = received - lateness if received > lateness else 0
-        if self._sent:
-            self._sent.clear()
+        self._sent.clear()
         self._state = receive(self._machine, before, plan, message, received, self._send, sent)
         commands = self._send_rest(received) if self._has_rest else []
         done = time.perf_counter_ns()
 
         # Nobody waits for what follows.
-        self.recording.record(self._topics[name], self._types[name], received, data, sent)
+        topic = self._topics[name]
+        self.recording.record(topic, type_name, received, data, sent)
         if self.has_viewer:
-            self._newest_inputs[self._topics[name]] = TopicMessage(self._topics[name], self._types[name], data)
+            self._newest_inputs[topic] = TopicMessage(topic, type_name, data)
         if not plan.holds_records:
             self._newest[name] = data
         stamp = message.stamp if plan.holds_records else None
-        for listener in self._listeners[name]:
+        for listener in listeners:
             listener.on_input(name, stamp, lateness)
         if self._sent:
             self._record_answers(commands, done - began)
@@ -311,7 +322,7 @@ class EstimatorNode(ManagedNode):
 
     def _on_malformed(self, name: str, error: ValueError) -> None:
         """Count a message that cannot be read, and say why."""
-        for listener in self._listeners[name]:
+        for listener in self._counted[name].listeners:
             listener.on_malformed(name)
         self.get_logger().error(f'{self._topics[name]}: {error}', throttle_duration_sec=1.0)
 

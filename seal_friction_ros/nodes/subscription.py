@@ -17,9 +17,10 @@ def with_source_time(callback: Callable[[Any, int, int], None]) -> Callable[...,
     tuple.
     """
 
-    def call(*taken: Any) -> None:
+    def call(message: Any, info: Any = None) -> None:
         """What rclpy calls."""
-        message, info = taken[0] if len(taken) == 1 else taken
+        if info is None:
+            message, info = message
         callback(message, info['source_timestamp'], info['received_timestamp'])
 
     vars(call)['__signature__'] = _TWO

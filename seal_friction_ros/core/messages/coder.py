@@ -36,16 +36,17 @@ def _encoder(layout: Layout) -> Callable[[int, bytes, tuple[Any, ...]], bytes]:
 def _decoder(layout: Layout) -> Callable[[bytes], Any]:
     """Makes the record of a message from its bytes."""
     record, check, keeps_frame = layout.record, layout.check, layout.keeps_frame
-    known: dict[int, tuple[Callable[[bytes], tuple[Any, ...]], bytes]] = {}  # by the size of the message
+    known: dict[int, Callable[[bytes], tuple[Any, ...]]] = {}  # by the size of the message
 
     def decode_bytes(data: bytes) -> Any:
         """Record of one message; ValueError for bytes that are none."""
         if data[:2] != LITTLE_ENDIAN:
             raise ValueError(f'encapsulation {data[:4].hex()} of {len(data)} bytes is not little-endian CDR')
-        found = known.get(len(data))
-        if found is None or found[1] != data[_FRAME_LENGTH]:
-            found = known[len(data)] = _struct_of_bytes(layout, data).unpack_from, data[_FRAME_LENGTH]
-        fields = found[0](data)
+        unpack = known.get(len(data))
+        fields = unpack(data) if unpack else None
+        if fields is None or fields[3] != len(fields[4]):  # another length of the frame name, padded to the same size
+            unpack = known[len(data)] = _struct_of_bytes(layout, data).unpack_from
+            fields = unpack(data)
         nanoseconds = fields[2]
         if nanoseconds >= SECOND:
             raise ValueError(f'header with {nanoseconds} ns is not valid')
