@@ -9,7 +9,7 @@ velocity, and the state of the filter:
 
 ====  =============================================================================================
 s     scale of the law
-c     share of Coulomb friction that does not follow the law [N]
+c     misfit: friction that the law misses at the present pressure [N]
 k     viscous friction that the law does not have [N s/m]
 a     asymmetry: part of the friction that has another size in the two directions
 b     offset of the force sum where the rod is now: load, area or sensor zero that nobody took off [N]
@@ -17,11 +17,14 @@ g     gradient of the offset over the way: load over position, as of a boom or a
 n     remainder: what none of these explains and what passes within `REMAINDER_TIME` [N]
 ====  =============================================================================================
 
-The offset goes on with the way x of the rod, :math:`b_{i+1} = b_i + g\,\Delta x`; beside that all but n are random
-walks, n is a first-order Gauss-Markov process and e is white. Friction is all but b, g and n, and its
+The offset goes on with the way x of the rod, :math:`b_{i+1} = b_i + g\,\Delta x`; n and c are first-order Gauss-Markov
+processes, n over time and c over the relative change of f; the others are random walks and e is white. Friction is all but b, g and n, and its
 variance is that of the posterior: what cannot be told apart, as asymmetry from offset in one pressure, stays in the
 band, and so does a gradient beyond the longest stroke that the rod came back from. Terms that a motion does not excite
 keep their prior.
+
+The misfit keeps the scale the mean over all pressures: no law is right at each, and a law of one kind of seals for two
+misses some by a tenth. Without c the scale would be that of the pressure seen last.
 
 The remainder makes the filter what it is: a friction that wavers over a stroke would else drag offset and scale along
 from one side of their band to the other. Samples that are too far away count less, as with noise of heavy tails; if
@@ -40,15 +43,13 @@ from seal_friction_ros.core.foundation.limits import between
 from seal_friction_ros.core.messages.records import NEVER
 
 # Prior: one standard deviation. A share is one of the friction by the law at the first sample.
-SCALE_PRIOR = 0.3  # [-] of another day, beside the deviation of the seal file
-COULOMB_PRIOR = 0.3  # [-] share
+SCALE_PRIOR = 0.42  # [-] of another day, beside the deviation of the seal file
 VISCOUS_PRIOR = 1.0  # [s/m] share per speed
 ASYMMETRY_PRIOR = 0.08  # [-]
 OFFSET_PRIOR = 10.0  # [-] share
 GRADIENT_PRIOR = 30.0  # [1/m] share over the way
 # Random walks: one standard deviation after one second.
 SCALE_WALK = 0.005  # [-]
-COULOMB_WALK = 0.005  # [-] share
 VISCOUS_WALK = 0.02  # [s/m] share per speed
 ASYMMETRY_WALK = 0.001  # [-]
 OFFSET_WALK = 0.002  # [-] share
@@ -56,6 +57,8 @@ OFFSET_WALK = 0.002  # [-] share
 GRADIENT_WALK = 1.0  # [-]
 CURVED = 0.2  # [-] share: root mean square of an unexplained drift from which on the load may be curved over the way
 SHORTEST_STROKE = 1e-4  # [m]
+MISFIT = 0.06  # [-] share: standard deviation of c
+MISFIT_RANGE = 0.5  # [-] relative change of the friction of the law over which c passes
 REMAINDER_TIME = 0.4  # [s] time constant of n
 REMAINDER = 0.05  # [-] share: standard deviation of n
 LEAST_NOISE = 0.1  # [-] share: standard deviation of e at first and at least, since readings in a row miss alike
@@ -76,7 +79,7 @@ class Terms(NamedTuple):
     """The state of the filter, or a row of its covariance."""
 
     scale: float  # s
-    coulomb: float  # c
+    misfit: float  # c
     viscous: float  # k
     asymmetry: float  # a
     offset: float  # b
@@ -188,7 +191,7 @@ class Reading(NamedTuple):
 @compilable
 def friction_magnitude(terms: Terms, direction: float, speed: float, friction: float) -> float:
     """Friction of a rod that slides [N], never negative; at a ``direction`` of 0 the mean of both."""
-    magnitude = terms.scale * friction + terms.coulomb + terms.viscous * speed
+    magnitude = terms.scale * friction + terms.misfit + terms.viscous * speed
     magnitude += direction * terms.asymmetry * friction
     return magnitude if magnitude > 0.0 else 0.0
 
@@ -227,10 +230,10 @@ def begun(reading: Reading) -> FrictionFilter:
     force = reading.friction
     by_file = reading.friction_std / force
     scale = math.sqrt(SCALE_PRIOR * SCALE_PRIOR + by_file * by_file)  # hypot differs by a bit in compiled code
-    coulomb, viscous, offset = COULOMB_PRIOR * force, VISCOUS_PRIOR * force, OFFSET_PRIOR * force
+    misfit, viscous, offset = MISFIT * force, VISCOUS_PRIOR * force, OFFSET_PRIOR * force
     gradient, remainder = GRADIENT_PRIOR * force, REMAINDER * force
     diagonal = replace(
-        NO_COVARIANCE, ss=scale * scale, cc=coulomb * coulomb, kk=viscous * viscous,
+        NO_COVARIANCE, ss=scale * scale, cc=misfit * misfit, kk=viscous * viscous,
         aa=ASYMMETRY_PRIOR * ASYMMETRY_PRIOR, bb=offset * offset, gg=gradient * gradient, nn=remainder * remainder,
     )  # fmt: skip
     return replace(
@@ -239,19 +242,22 @@ def begun(reading: Reading) -> FrictionFilter:
 
 
 @compilable
-def _predicted(known: FrictionFilter, reading: Reading, elapsed: float, moved: float, longest: float) -> Covariance:
-    """Covariance before the next reading: the offset takes its gradient along, n fades, the others walk.
+def _predicted(
+    known: FrictionFilter, reading: Reading, fits: float, elapsed: float, moved: float, longest: float
+) -> Covariance:
+    """Covariance before the next reading: the offset takes its gradient along, c and n fade, the others walk.
 
     Args:
         known: Before the reading.
         reading: With the way to it.
+        fits: Share of c that is left at its pressure.
         elapsed: [s] since the reading before: offset and n change at rest, too.
         moved: [s] of it in motion.
         longest: Stroke [m].
     """
     way, law, drift = reading.way, reading.friction, CURVED * reading.friction
     kept = REMAINDER_TIME / (REMAINDER_TIME + elapsed)
-    coulomb, viscous, offset = COULOMB_WALK * law, VISCOUS_WALK * law, OFFSET_WALK * law
+    misfit, viscous, offset = MISFIT * law, VISCOUS_WALK * law, OFFSET_WALK * law
     gradient, remainder = GRADIENT_WALK * law / longest, REMAINDER * law
     curved = abs(way) / longest if known.unexplained.drift_square > drift * drift else 0.0
     (
@@ -259,8 +265,9 @@ def _predicted(known: FrictionFilter, reading: Reading, elapsed: float, moved: f
         aa, ab, ag, an, bb, bg, bn, gg, gn, nn,
     ) = known.covariance  # fmt: skip
     return Covariance(
-        ss + moved * SCALE_WALK * SCALE_WALK, sc, sk, sa, sb + way * sg, sg, kept * sn,
-        cc + moved * coulomb * coulomb, ck, ca, cb + way * cg, cg, kept * cn,
+        ss + moved * SCALE_WALK * SCALE_WALK, fits * sc, sk, sa, sb + way * sg, sg, kept * sn,
+        fits * fits * cc + (1.0 - fits * fits) * misfit * misfit,
+        fits * ck, fits * ca, fits * (cb + way * cg), fits * cg, kept * fits * cn,
         kk + moved * viscous * viscous, ka, kb + way * kg, kg, kept * kn,
         aa + moved * ASYMMETRY_WALK * ASYMMETRY_WALK, ab + way * ag, ag, kept * an,
         bb + way * (2.0 * bg + way * gg) + elapsed * offset * offset, bg + way * gg, kept * (bn + way * gn),
@@ -276,15 +283,16 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
         known = begun(reading)
     elapsed = between(0.0, (reading.stamp - known.stamp) * 1e-9, 3600.0)
     moved = elapsed if elapsed < LONGEST_STEP else LONGEST_STEP
-    kept = REMAINDER_TIME / (REMAINDER_TIME + elapsed)
+    kept, law = REMAINDER_TIME / (REMAINDER_TIME + elapsed), reading.friction
+    fits = MISFIT_RANGE / (MISFIT_RANGE + 2.0 * abs(law - known.friction) / (law + known.friction))
     stroke, longest = abs(reading.way), known.longest
     if reading.direction == known.direction:
         stroke += known.stroke
     elif known.stroke > longest:
         longest = known.stroke
     s, c, k, a, b, g, n = known.terms
-    terms = Terms(s, c, k, a, b + reading.way * g, g, kept * n)
-    covariance = _predicted(known, reading, elapsed, moved, stroke if stroke > longest else longest)
+    terms = Terms(s, fits * c, k, a, b + reading.way * g, g, kept * n)
+    covariance = _predicted(known, reading, fits, elapsed, moved, stroke if stroke > longest else longest)
     innovation = reading.force - expected(terms, reading)
     usual = known.unexplained.usual
     noise = known.unexplained.noise * (reading.friction if reading.friction > usual else usual)
@@ -351,9 +359,9 @@ def _corrected(
         ss, sc, sk, sa, sb, sg, sn, cc, ck, ca, cb, cg, cn, kk, ka, kb, kg, kn,
         aa, ab, ag, an, bb, bg, bn, gg, gn, nn,
     ) = covariance  # fmt: skip
-    scale, coulomb, viscous, asymmetry, offset, gradient, remainder = terms
+    scale, misfit, viscous, asymmetry, offset, gradient, remainder = terms
     terms = Terms(
-        scale + sv * innovation, coulomb + cv * innovation, viscous + kv * innovation, asymmetry + av * innovation,
+        scale + sv * innovation, misfit + cv * innovation, viscous + kv * innovation, asymmetry + av * innovation,
         offset + bv * innovation, gradient + gv * innovation, remainder + nv * innovation,
     )  # fmt: skip
     return terms, Covariance(
