@@ -180,7 +180,8 @@ ALGORITHM_VERSION = 6
 """Version of estimator and feed-forward: it changes when the same messages give other bytes.
 
 1: until the feed-forward had one gain, and time was the stamps of the messages. 2: until one filter learnt the
-friction. 3: until its noise was a share of the usual friction.
+friction. 3: until its noise was a share of the usual friction. 5: until it told the law's misfit at a pressure from the
+scale.
 """
 
 _RENAMED = {'coulomb_scale': 'scale'}  # settings of version 1
