@@ -14,9 +14,7 @@ class NotJsonError(ValueError):
 def parse_json(text: str | bytes, where: str) -> Any:
     """Document of a text that may come from anybody; ``where`` names it in the error message.
 
-    Raises:
-        NotJsonError: The text is not JSON.
-        ValueError: It is more than `DEEPEST` levels deep.
+    NotJsonError: the text is not JSON; ValueError: it is more than `DEEPEST` levels deep.
     """
     try:
         document = json.loads(text)

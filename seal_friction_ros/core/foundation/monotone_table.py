@@ -23,15 +23,8 @@ def interpolated(
 ) -> float:
     """Piecewise cubic at ``x``; the first or last ordinate beyond the ends.
 
-    Args:
-        knots: Abscissae of the points, increasing, shape (n,).
-        cubic: Coefficient of the third power of the distance from each knot, shape (n - 1,); likewise the next three.
-        square: Of the second power.
-        slope: Of the first power.
-        value: Ordinate at each knot.
-        last: Ordinate at the last knot.
-        x: Abscissa.
-        _unused: A bound function takes two arguments.
+    ``cubic``, ``square`` and ``slope`` are the coefficients of the powers of the distance from each of the increasing
+    knots, shape (n - 1,), ``value`` its ordinate. A bound function takes two arguments, so one is not used.
     """
     if x >= knots[-1]:
         return last
@@ -45,15 +38,9 @@ class MonotoneTable:
     """Monotone piecewise cubic through points [Fritsch1980]_; constant beyond both ends.
 
     ``scipy.interpolate.PchipInterpolator`` gives the coefficients. `interpolated` evaluates one value twenty times
-    faster than SciPy, since the live estimate asks for one value at a time.
-
-    Args:
-        x: Abscissae, strictly increasing, shape (n,), n >= 2.
-        y: Ordinates, shape (n,), finite.
-        name: Name of the table, for error messages.
-
-    Raises:
-        ValueError: The points are too few, not finite or not in increasing order.
+    faster than SciPy, since the live estimate asks for one value at a time. Abscissae x and ordinates y have the shape
+    (n,), n >= 2; ``name`` is for error messages. ValueError: the points are too few, not finite or not in increasing
+    order.
     """
 
     def __init__(self, x: Sequence[float], y: Sequence[float], name: str) -> None:

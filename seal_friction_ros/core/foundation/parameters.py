@@ -64,8 +64,7 @@ class ParameterGroup(NamedTuple):
 def check(record: Any) -> None:
     """Check the described fields of a dataclass instance against their bounds.
 
-    Raises:
-        ValueError: A number is not finite or out of bounds; the message names field, value, unit and bound.
+    ValueError: a number is not finite or out of bounds; the message names field, value, unit and bound.
     """
     for name, meaning in meanings(record).items():
         value = getattr(record, name)
@@ -80,8 +79,7 @@ def check(record: Any) -> None:
 class CheckedParameters:
     """Base of a dataclass of `parameter` fields: `check` runs at construction, so an invalid record never exists.
 
-    Raises:
-        ValueError: A number is not finite or out of bounds.
+    ValueError: a number is not finite or out of bounds.
     """
 
     def __post_init__(self) -> None:
@@ -102,19 +100,12 @@ def _check_number(where: str, value: Any, meaning: Meaning) -> None:
 
 
 def from_mapping(record_type: type[Record], values: Any, where: str, **made: Any) -> Record:
-    """Make a dataclass from untrusted input.
+    """Make a dataclass, whose fields are bool, int, float, str or tuples of str or float, from untrusted input.
 
     Integers convert to floats, lists to tuples, and where a number is declared, texts with a unit to SI. No other type
-    is converted.
-
-    Args:
-        record_type: Dataclass whose fields are bool, int, float, str or tuples of str or float.
-        values: Field name -> value; fields with a default are optional.
-        where: Name of the mapping in error messages.
-        made: Values of further fields; the mapping must not contain these fields.
-
-    Raises:
-        ValueError: A field is unknown, missing, of the wrong type or out of bounds.
+    is converted. Fields with a default are optional. ``made`` has values of further fields, which ``values`` must not
+    contain; ``where`` names the mapping in error messages. ValueError: a field is unknown, missing, of the wrong type
+    or out of bounds.
     """
     if not isinstance(values, Mapping):
         raise ValueError(f'{where} is not a mapping of names to values but {values!r}')
@@ -137,8 +128,7 @@ def from_mapping(record_type: type[Record], values: Any, where: str, **made: Any
 def check_names(values: Mapping[Any, Any], known: Collection[str], where: str) -> None:
     """Check that a mapping has ``known`` names only; ``where`` names the mapping in the error message.
 
-    Raises:
-        ValueError: Another name is present; the message lists the known names and the most similar ones.
+    ValueError: another name is present; the message lists the known names and the most similar ones.
     """
     unknown = sorted(printable(name) for name in values if name not in known)
     if unknown:
@@ -172,14 +162,9 @@ def meant(word: str, known: Iterable[str]) -> str:
 
 
 def name_and_source(document: Any, kind: str) -> tuple[str, str]:
-    """``name`` and ``source`` of a document; the source is '' if the document has none.
+    """``name`` and ``source`` of an untrusted document of a ``kind``, for example ``case``; '' if it has no source.
 
-    Args:
-        document: Untrusted input.
-        kind: Kind of file, for example ``case``.
-
-    Raises:
-        ValueError: The document is not a mapping, its name is not one line of text, or its source is not text.
+    ValueError: the document is not a mapping, its name is not one line of text, or its source is not text.
     """
     if not isinstance(document, Mapping):
         raise ValueError(f'a {kind} file is a mapping of names to values, not {type(document).__name__}')

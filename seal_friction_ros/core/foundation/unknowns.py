@@ -38,10 +38,7 @@ class Unknown:
         \text{range: } & x = a + (b - a) u
 
     So a ``relative_std`` is log-normal with the median x_0, the others are uniform, a ``factor`` in the logarithm (our
-    choice).
-
-    Raises:
-        ValueError: The kind has other numbers, or x_0 is not positive where the spread is relative to it.
+    choice). ValueError: the kind has other numbers, or x_0 is not positive where the spread is relative to it.
     """
 
     name: str  # dotted, for example ``rubber.hardness``
@@ -84,16 +81,11 @@ class Unknown:
 def parse_unknowns(
     values: Any, known: Mapping[str, float], vary: Callable[[Mapping[str, float]], Any], where: str
 ) -> tuple[Unknown, ...]:
-    """Unknowns of a case file.
+    """Unknowns of a case file from its untrusted mapping of names to spreads; ``where`` names it in error messages.
 
-    Args:
-        values: Mapping of name to spread, untrusted.
-        known: Value in the case of each number that may be unknown.
-        vary: Makes the case with other values, by name; raises ValueError if there is no such case.
-        where: Name of the mapping in error messages.
-
-    Raises:
-        ValueError: A name or a spread is invalid, or there is no case at one of its `Unknown.ends`; one line.
+    ``known`` has the value in the case of each number that may be unknown. ``vary`` makes the case with other values;
+    ValueError if there is no such case. ValueError: a name or a spread is invalid, or there is no case at one of its
+    `Unknown.ends`; one line.
     """
     if not isinstance(values, Mapping) or not values:
         raise ValueError(f'{where} is not a mapping of names to spreads but {values!r}')

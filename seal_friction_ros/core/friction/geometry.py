@@ -10,10 +10,8 @@ from seal_friction_ros.core.foundation.parameters import CheckedParameters, para
 class SealGeometry(CheckedParameters):
     """An O-ring and the ring-shaped space it is squeezed into.
 
-    The space lies between an inner wall (rod, or groove of a piston) and an outer wall (gland, or bore).
-
-    Raises:
-        ValueError: A dimension is out of bounds, the walls do not fit, or the ring is not squeezed.
+    The space lies between an inner wall (rod, or groove of a piston) and an outer wall (gland, or bore). ValueError: a
+    dimension is out of bounds, the walls do not fit, or the ring is not squeezed.
     """
 
     section_diameter: float = parameter(unit='m', lower=1e-4, upper=0.1, description='Diameter of the ring section, d.')

@@ -62,8 +62,7 @@ def scipy_gmres(
 ) -> FloatArray:
     """`Solver` of SciPy, without restart.
 
-    Raises:
-        StalledError: The residual is larger after ``iterations``, or not a number.
+    StalledError: the residual is larger after ``iterations``, or not a number.
     """
     operator = LinearOperator((len(right), len(right)), product, dtype=np.float64)
     found, failed = gmres(operator, right, rtol=0.0, atol=tolerance, restart=iterations, maxiter=1)
@@ -241,11 +240,7 @@ def _newton_change(
     elastic: FloatArray,
     compliance_factor: float,
 ) -> tuple[FloatArray, FloatArray]:
-    """Changes of gap and of the unknown left in each cell.
-
-    Raises:
-        NotConvergedError: GMRES did not converge.
-    """
+    """Changes of gap and of the unknown left in each cell; NotConvergedError: GMRES did not converge."""
     stiffness = contact.body.stiffness_band / compliance_factor
     kernel = np.concatenate((stiffness[:0:-1], stiffness))  # of the product with the banded stiffness
     band = _factored_band(rows, kept, slope, stiffness)
@@ -286,20 +281,13 @@ def contact_step(
     time_step: float,
     compliance_factor: float = 1.0,
 ) -> ContactStep:
-    """Film and gap after one implicit Euler step; infinite ``time_step`` for the steady film.
+    """Film and gap after one implicit Euler step; infinite ``time_step`` [s] for the steady film.
 
-    Args:
-        contact: The contact.
-        guess: Start of Newton's method: the state before the step, or an extrapolation.
-        rigid_gap: Gap at the end of the step without the deflection by film and asperities [m], shape (n,).
-        wall_velocity: Velocity of the wall in the frame of the seal during the step [m/s].
-        ends: Conditions at both ends of the film.
-        old_thickness: theta h before the step [m], shape (n,).
-        time_step: [s]
-        compliance_factor: Factor of the compliance of the half-plane (viscoelastic seal).
-
-    Raises:
-        NotConvergedError: Newton's method or GMRES did not converge, or the surfaces would overlap.
+    ``guess`` is the start of Newton's method: the state before the step, or an extrapolation. ``rigid_gap`` [m] is that
+    at the end of the step without the deflection by film and asperities, ``old_thickness`` [m] theta h before the step,
+    shape (n,) each; the wall has its velocity [m/s] in the frame of the seal. ``compliance_factor`` scales the
+    compliance of the half-plane (viscoelastic seal). NotConvergedError: Newton's method or GMRES did not converge, or
+    the surfaces would overlap.
     """
     plane, rough, numbers = contact.body, contact.rough, contact.grease.numbers
     rate = 1.0 / time_step
@@ -341,8 +329,7 @@ def contact_step(
 def dry_contact(contact: LubricatedContact, rigid_gap: FloatArray, guess: FloatArray | None = None) -> FloatArray:
     """Gap of the dry rough contact [m], shape (n,): h = g + K p_c(h); Newton's method begins at ``guess``, or at g.
 
-    Raises:
-        NotConvergedError: Newton's method did not converge.
+    NotConvergedError: Newton's method did not converge.
     """
     plane = contact.body
     matrix = plane.matrix()

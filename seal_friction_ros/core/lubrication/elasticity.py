@@ -128,17 +128,12 @@ def condensed_body(
 
     .. math:: K = N C N^T + A - \Pi A \Pi,\quad \Pi = N (N^T N)^{-1} N^T
 
-    with the compliance C of the nodes, their hat functions N in the cells, and the influence matrix A of the
-    half-plane, which answers to what is shorter than the elements (the split is our choice). Where C is that of a
-    half-plane, K is A, whatever the mesh. A pressure that follows the surface makes C slightly unsymmetric; K is made
-    symmetric, and nowhere stiffer than A at its stiffest, which keeps it positive (our choice).
-
-    Args:
-        places: Centres of the cells [m], in equal steps, within the nodes, shape (n,).
-        nodes: Places of the nodes [m], increasing, shape (m,).
-        compliance: Displacement by a force on a node, all round [m/N], shape (m, m).
-        modulus: Plane-strain modulus E* [Pa].
-        circumference: Length that a force acts on [m]; 1 m for plane strain.
+    with the compliance C of the nodes, all round [m/N], shape (m, m), their hat functions N in the cells, and the
+    influence matrix A of the half-plane of the plane-strain ``modulus`` E* [Pa], which answers to what is shorter than
+    the elements (the split is our choice). Where C is that of a half-plane, K is A, whatever the mesh. A pressure that
+    follows the surface makes C slightly unsymmetric; K is made symmetric, and nowhere stiffer than A at its stiffest,
+    which keeps it positive (our choice). The centres of the cells ``places`` [m], shape (n,), are in equal steps within
+    the increasing ``nodes`` [m], shape (m,); a force acts on the ``circumference`` [m], 1 m for plane strain.
     """
     width = float(places[1] - places[0])
     hats = hat_functions(places, nodes)

@@ -30,8 +30,7 @@ _LARGEST_RATIO = 7.0  # of the fit of phi_fs; 0 beyond
 def flow_factor_coefficients(peklenik_number: float) -> tuple[float, ...]:
     """Peklenik number and coefficients (C, r, A_1, alpha_1, alpha_2, alpha_3, A_2) for the compiled functions.
 
-    Raises:
-        ValueError: There are none for this number.
+    ValueError: there are none for this number.
 
     Source: N. Patir, H. S. Cheng 1978 (Table 2) and 1979 (Table 2).
     """

@@ -92,13 +92,8 @@ def _slid(
 ) -> tuple[ContactState, list[ContactState], int]:
     """Sliding at a ``velocity`` [m/s] by implicit Euler steps of ``durations`` [s]; one that fails is taken in halves.
 
-    An infinite step, to the steady film, is taken again after a finite one.
-
-    Returns:
-        The last state, that after each of ``durations``, and how many steps failed.
-
-    Raises:
-        NotConvergedError: More than 20 steps failed.
+    An infinite step, to the steady film, is taken again after a finite one. Returns the last state, that after each of
+    the durations, and how many steps failed. NotConvergedError: more than 20 steps failed.
     """
     state, states, retried = start, [], 0
     for duration in durations:
@@ -126,8 +121,7 @@ def _slid(
 def steady_state(model: LubricationModel, start: ContactState, velocity: float) -> tuple[ContactState, int]:
     """Film of steady sliding at a ``velocity`` [m/s] by ever longer steps from ``start``; how many steps failed.
 
-    Raises:
-        NotConvergedError: More than 20 steps failed.
+    NotConvergedError: more than 20 steps failed.
     """
     passage = model.film_width / abs(velocity)
     state, _, retried = _slid(model, start, velocity, [share * passage for share in _PASSAGES])
@@ -137,8 +131,7 @@ def steady_state(model: LubricationModel, start: ContactState, velocity: float) 
 def steady_friction(case: LubricationCase, pressure: float) -> SteadyFriction:
     """Steady sliding friction of a case at one pressure [Pa], both directions, over the speeds of its grid.
 
-    Raises:
-        NotConvergedError: A film did not converge; the message says at which speed and pressure.
+    NotConvergedError: a film did not converge; the message says at which speed and pressure.
     """
     model, begin, stiffness = _at_rest(case, pressure)
     real_contact = float(real_area_share(model.contact, begin.gap).max())
@@ -166,9 +159,7 @@ def memory_length(case: LubricationCase) -> MemoryLength:
 
     From steady sliding at a fifth of the highest speed of the motion the speed is set to the highest; the length is
     that of an exponential of the same area, the integral of (F - F_end) / (F_start - F_end) over the way.
-
-    Raises:
-        NotConvergedError: A step did not converge.
+    NotConvergedError: a step did not converge.
     """
     model, start, _ = _at_rest(case, 0.0)
     fast = case.motion.speed
@@ -186,10 +177,7 @@ def friction_map(case: LubricationCase, rows: list[SteadyFriction], memory: floa
     """The law from its computed rows, one for each pressure of the grid, in any order.
 
     The presliding length is friction over stiffness at 0 Pa. An O-ring that no pressure holds on its wall rolls, so its
-    length is that of the next pressure (our choice).
-
-    Raises:
-        ValueError: The rows are not those of the grid.
+    length is that of the next pressure (our choice). ValueError: the rows are not those of the grid.
     """
     ordered = sorted(rows, key=lambda row: row.pressure)
     pressures = map_pressures(case.map)

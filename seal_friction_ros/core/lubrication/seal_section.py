@@ -69,8 +69,7 @@ def section_rubber(seal: SealBody) -> Rubber:
 def face_compliance(section: SealSection) -> FaceCompliance:
     """Compliance of the face of the unloaded section, held at its groove.
 
-    Raises:
-        NotConvergedError: The stiffness is singular.
+    NotConvergedError: the stiffness is singular.
     """
     model, face = section.model, section.face
     middle = np.abs(section.place) <= 0.25 * np.ptp(section.place)
@@ -90,9 +89,7 @@ def nothing_around(model: OringModel) -> Surroundings:
 def seal_body(seal: SealBody, numerics: LubricationNumerics) -> ElasticBody:
     """Body of a seal on the cells of its film.
 
-    Raises:
-        ValueError: The grid does not fit the body.
-        NotConvergedError: The stiffness of the finite elements is singular.
+    ValueError: the grid does not fit the body; NotConvergedError: the stiffness of the finite elements is singular.
     """
     cells, width = numerics.cells, numerics.film_width / numerics.cells
     if seal.body != 'finite_elements':

@@ -65,17 +65,12 @@ class ForceBalance(NamedTuple):
 
 
 def make_model(mesh: Mesh, rubber: Rubber, section_diameter: float, guide: float) -> OringModel:
-    """Model of a meshed ring.
+    """Model of a meshed ring of ``section_diameter`` d [m].
 
     Between frictionless walls a round ring rolls almost freely: only its hoop strain resists, and the facets of the
     mesh make the motion jump. The guide, a couple without net force, keeps the two nodes halfway to rod and gland at
-    the same axial position (our choice; docs/oring.md has its influence).
-
-    Args:
-        mesh: Mesh of the section.
-        rubber: Material.
-        section_diameter: d [m].
-        guide: Stiffness of the guide over 2 pi R E, R the radius of the ring.
+    the same axial position (our choice; docs/oring.md has its influence). Its stiffness ``guide`` is that over 2 pi R
+    E, R the radius of the ring.
     """
     center = mesh.nodes.mean(axis=0)
     quarter = np.array([section_diameter / 4.0, 0.0])
@@ -148,8 +143,7 @@ def solve_equilibrium(
 ) -> tuple[OringState, int]:
     """Equilibrium state from a start state, and the number of Newton steps.
 
-    Raises:
-        NotConvergedError: An element is inverted, the stiffness is singular, or 25 steps do not converge.
+    NotConvergedError: an element is inverted, the stiffness is singular, or 25 steps do not converge.
     """
     state, now = start, force_balance(model, surroundings, start)
     if now is None:

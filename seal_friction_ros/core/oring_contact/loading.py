@@ -58,10 +58,8 @@ def loaded_states(case: OringCase, model: OringModel, pressures: tuple[float, ..
     """Equilibria at increasing pressures [Pa, gauge].
 
     At 0 Pa the ring is squeezed only and does not touch the downstream wall, as in the first case of the thesis.
-
-    Raises:
-        ValueError: The pressures are invalid, the squeezed ring is longer than the groove, or fluid passes the ring.
-        NotConvergedError: Newton's method did not converge.
+    ValueError: the pressures are invalid, the squeezed ring is longer than the groove, or fluid passes the ring;
+    NotConvergedError: Newton's method did not converge.
     """
     check_pressures(case, pressures)
     now = squeeze_ring(case, model)
@@ -87,11 +85,8 @@ def squeeze_ring(case: OringCase, model: OringModel) -> LoadedRing:
     """Ring squeezed between rod and gland, with one node fixed along the axis.
 
     The walls move from first contact with the free ring to their final radii at reduced penalty, then the penalty rises
-    to its full value.
-
-    Raises:
-        ValueError: The squeezed ring is longer than the groove.
-        NotConvergedError: Newton's method did not converge.
+    to its full value. ValueError: the squeezed ring is longer than the groove; NotConvergedError: Newton's method did
+    not converge.
     """
     assembly, walls = make_assembly(model, _fixed(model)), _dry_walls(case, model)
     inner = case.geometry.ring_inner_diameter / 2.0
@@ -128,9 +123,7 @@ def seat_ring(case: OringCase, model: OringModel, free: Assembly, squeezed: Load
 
     The wall is placed at the ring, with a small penetration, so the ring need not cross a gap. One node of the ring
     stays fixed while the wall takes load; it is then released under the pressure that balances the wall force.
-
-    Raises:
-        NotConvergedError: Newton's method did not converge.
+    NotConvergedError: Newton's method did not converge.
     """
     top = float(outline(model, squeezed.state)[:, 1].max())
     wall = squeezed.surroundings._replace(

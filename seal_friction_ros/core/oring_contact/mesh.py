@@ -28,16 +28,10 @@ class Mesh(NamedTuple):
 
 
 def o_grid(section_diameter: float, center_radius: float, lines: int) -> Mesh:
-    """O-grid of a circular section.
+    """O-grid of a circular section of diameter d [m], whose centre is ``center_radius`` [m] off the axis.
 
-    Args:
-        section_diameter: Diameter of the section, d [m].
-        center_radius: Distance of its centre from the axis [m].
-        lines: Grid lines that end on the quarter of the outline that faces the rod, at least 5; the same number face
-            the gland, fewer the wall and the fluid.
-
-    Raises:
-        ValueError: ``lines`` is below 5.
+    So many grid ``lines`` end on the quarter of the outline that faces the rod; the same number face the gland, fewer
+    the wall and the fluid. ValueError: ``lines`` is below 5.
     """
     if lines < 5:
         raise ValueError(f'o_grid: lines = {lines} is below 5: the contact would have one or two nodes')

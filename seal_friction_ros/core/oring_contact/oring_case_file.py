@@ -49,8 +49,7 @@ _KEYS = (
 class MeasuredFriction(CheckedParameters):
     """Measured friction, for comparison with the computed one.
 
-    Raises:
-        ValueError: A value is out of bounds, or the numbers of frictions and pressures differ.
+    ValueError: a value is out of bounds, or the numbers of frictions and pressures differ.
     """
 
     seals: int = parameter(unit='', lower=1, upper=100, description='Number of seals in the measured friction.')
@@ -91,8 +90,7 @@ class _Pressures:
 def parse_oring_case(document: Any) -> OringCaseFile:
     """Parse the document of a case file.
 
-    Raises:
-        ValueError: A value is invalid; the message names case, field, value and bound.
+    ValueError: a value is invalid; the message names case, field, value and bound.
     """
     name, source = name_and_source(document, 'case')
     where = f'case {name}'
@@ -180,8 +178,7 @@ FRICTION_COEFFICIENT, HARDNESS = 'friction_coefficient', 'rubber.hardness'
 def varied_ring(case: OringCase, values: Mapping[str, float]) -> OringCase:
     """A case with other ``values`` of its unknowns, by their names; a hardness [Shore A] gives the modulus.
 
-    Raises:
-        ValueError: There is no such ring.
+    ValueError: there is no such ring.
     """
     parts: dict[str, dict[str, float]] = {}
     others: dict[str, Any] = {}

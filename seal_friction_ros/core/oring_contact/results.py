@@ -83,9 +83,8 @@ class OringResult(NamedTuple):
 def oring_results(case: OringCase, pressures: tuple[float, ...]) -> Iterator[OringResult]:
     """Results of a case at increasing pressures [Pa, gauge], each yielded when it is computed.
 
-    Raises:
-        ValueError: The pressures are invalid, or the ring does not fit or does not seal.
-        NotConvergedError: Newton's method did not converge.
+    ValueError: the pressures are invalid, or the ring does not fit or does not seal; NotConvergedError: Newton's method
+    did not converge.
     """
     model = oring_model(case)
     for loaded in loaded_states(case, model, pressures):

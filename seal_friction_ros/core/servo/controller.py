@@ -240,18 +240,9 @@ valve_opening = chosen_by_type({ServoValve: oil_opening, PneumaticValve: air_ope
 def control(
     g: Gains, c: Constants, state: ControllerState, measured: Measurement, reference: Setpoint, feedforward: float
 ) -> tuple[ControllerState, Command]:
-    """One sample of the controller.
+    """One sample of the controller with the model of valve, cylinder and load ``c``; the next state and the command.
 
-    Args:
-        g: Gains.
-        c: Model of valve, cylinder and load.
-        state: State after the previous sample.
-        measured: Position, velocity and pressures, all finite.
-        reference: Setpoint; any number, also not finite.
-        feedforward: Friction feed-forward [N], positive on extension; any number, also not finite.
-
-    Returns:
-        The next state and the spool command.
+    ``measured`` is finite; the reference and the ``feedforward`` [N], positive on extension, may be any number.
     """
     load, k = c.load, g.controller
     setpoint, limited = limit_reference(g, state.reference, reference)

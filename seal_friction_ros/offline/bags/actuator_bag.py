@@ -93,13 +93,8 @@ TYPES = Topics(*(getattr(layouts, f'{name.upper()}_TYPE') for name in Topics._fi
 def find_topics(bag: Path, namespace: str = '', infos: Mapping[str, TopicInfo] | None = None) -> Topics:
     """The estimator's topics in a bag, found by message type, so that names and remapping do not matter.
 
-    Args:
-        bag: The bag.
-        namespace: Use only topics below it; for bags of several actuators.
-        infos: Topics of the bag, if they are known.
-
-    Raises:
-        BagError: There is no velocity topic, or a type of this project has several topics.
+    Only topics below the ``namespace`` count, in bags of several actuators. BagError: there is no velocity topic, or a
+    type of this project has several topics.
     """
     known = bag_topics(bag) if infos is None else infos
     result = Topics(*(find_topic(bag, wanted, namespace, known) for wanted in TYPES))
@@ -154,11 +149,7 @@ class ActuatorBag(NamedTuple):
         return sum(info.message_count for info in self.infos.values())
 
     def messages(self, *, with_answers: bool = False) -> Iterator[BagMessage]:
-        """Messages in order of log time; BagError where the bag is damaged.
-
-        Args:
-            with_answers: Whether to estimate, too, if the bag has a mapping file and so no estimates.
-        """
+        """Messages in order of log time, with estimates by a mapping file if wanted; BagError where it is damaged."""
         if not self.actuator:
             return read_messages(self.path)
         return _OfActuator(self).messages(machine_messages(self.path, self.mapping, with_answers=with_answers))
@@ -176,16 +167,11 @@ class ActuatorBag(NamedTuple):
 
 
 def open_actuator(bag: Path, namespace: str = '', mapping: MappingFile | None = None) -> ActuatorBag:
-    """Find an actuator in a bag.
+    """Find an actuator in a bag of ``friction_estimator``, ``machine_estimator``, or with a mapping file in any rosbag.
 
-    Args:
-        bag: Of ``friction_estimator``, of ``machine_estimator``, or with a mapping file any rosbag.
-        namespace: Use only topics below it; of a machine the name of the actuator.
-        mapping: Mapping file of the machine.
-
-    Raises:
-        BagError: The bag cannot be read, it has no velocity, or there are several actuators and none is named.
-        ValueError: The mapping does not fit the bag.
+    Only topics below the ``namespace`` count; of a machine it is the name of the actuator. BagError: the bag cannot be
+    read, it has no velocity, or there are several actuators and none is named; ValueError: the mapping does not fit the
+    bag.
     """
     infos = bag_topics(bag)
     if mapping is not None and is_for(mapping, infos):
@@ -376,14 +362,9 @@ class Source(NamedTuple):
 
 
 def source_of(bag: Path | ActuatorBag, namespace: str) -> Source:
-    """Messages to replay.
+    """Messages to replay, of a bag or an actuator of it; BagError: it cannot be read, or lacks what is needed.
 
-    Args:
-        bag: The bag, or one actuator of it.
-        namespace: Use only topics below it; the name of an actuator of a machine: that actuator alone.
-
-    Raises:
-        BagError: The bag cannot be read, or has not what the estimator needs.
+    Only topics below the ``namespace`` count; the name of an actuator of a machine means that actuator alone.
     """
     infos: Mapping[str, TopicInfo]
     read: Callable[[], Iterator[BagMessage]]

@@ -102,16 +102,14 @@ class BagWriter:
     Log times are made strictly increasing, since readers sort by them: they return the messages in the order written.
     ``metadata.yaml`` exists from the start. It is updated after each finished file, for each new topic, and at the end.
 
-    As a context manager it removes the bag if the block fails, so that a failed command leaves no files.
+    As a context manager it removes the bag if the block fails, so that a failed command leaves no files. BagError:
+    there is something at ``path`` already, or it cannot be made.
 
     Args:
         path: Folder of the bag; must not exist.
         split_size: Largest size of a file, after which the next one begins [bytes]; 0: no limit.
         split_duration: Longest duration of a file, after which the next one begins [s]; 0: no limit.
         custom_data: For ``metadata.yaml``.
-
-    Raises:
-        BagError: There is something at ``path`` already, or it cannot be made.
     """
 
     def __init__(
@@ -159,18 +157,11 @@ class BagWriter:
         publish_time: int | None = None,
         description: Description | None = None,
     ) -> int:
-        """Append one serialised message; OSError if writing fails.
+        """Append one serialised message with a ``log_time`` [ns]; OSError if writing fails.
 
-        Args:
-            topic: Its topic.
-            type_name: Its type.
-            log_time: [ns]
-            data: Its bytes.
-            publish_time: [ns] on any clock; default: the recorded log time.
-            description: Of the topic; optional if the type is installed.
-
-        Returns:
-            The recorded log time [ns]: the one given, or 1 ns after the last one if that is later.
+        The ``publish_time`` [ns] is on any clock, by default the recorded log time. A topic whose type is installed
+        needs no ``description``. Returns the recorded log time [ns]: the one given, or 1 ns after the last one if that
+        is later.
         """
         key = (topic, type_name)
         if key not in self._descriptions:
@@ -362,8 +353,7 @@ def _qos(type_name: str) -> dict[str, Any]:
 def read_messages(path: Path) -> Iterator[BagMessage]:
     """Messages of a bag folder, or of a bare MCAP or SQLite file; file by file, each in order of log time.
 
-    Raises:
-        BagError: There is no bag, or it is damaged; raised when the damage is reached.
+    BagError: there is no bag, or it is damaged; raised when the damage is reached.
     """
     with _as_bag_errors(path):
         found = storage(path)
@@ -444,9 +434,7 @@ def read_definitions(path: Path, types: Iterable[str]) -> dict[str, Definition]:
     """Definition of each of some types (``package/Name``), of the bag if it has one.
 
     A bag holds them as MCAP schemas or in the table ``message_definitions`` of SQLite, which rosbag2 writes since Iron.
-
-    Raises:
-        BagError: The bag cannot be read, or a type is neither defined in it nor installed, nor one of ROS 2.
+    BagError: the bag cannot be read, or a type is neither defined in it nor installed, nor one of ROS 2.
     """
     wanted = dict.fromkeys(short_name(name) for name in types)
     texts: dict[str, str] = {}

@@ -75,17 +75,11 @@ def collected(
     messages: Iterable[BagMessage] | None = None,
     bulk_from: int = BULK_FROM,
 ) -> _Collector:
-    """A new collector with all blocks of a bag.
+    """A new collector with all blocks of a bag, or of the ``messages`` given.
 
-    Args:
-        bag: The bag.
-        wanted: Name -> topic and type of the messages that the collector takes.
-        make: Makes an empty collector; an unusual bag takes a second one.
-        messages: Instead of those of the bag.
-        bulk_from: Smallest number of messages to read in bulk.
-
-    Raises:
-        BagError: The bag cannot be read, or a message is not of its type; names its topic and time.
+    ``wanted`` gives topic and type of what the collector takes, by name. ``make`` makes an empty collector; an unusual
+    bag takes a second one. From ``bulk_from`` messages on, the bag is read in bulk. BagError: the bag cannot be read,
+    or a message is not of its type; names its topic and time.
     """
     kinds = {one.topic: (kind, one.type_name) for kind, one in enumerate(wanted.values(), start=1) if one.topic}
 
@@ -195,13 +189,8 @@ def extend(columns: list['array[float]'], rows: FloatArray) -> None:
 def in_turn(stamps: IntArray, places: IntArray, is_answer: BoolArray) -> tuple[IntArray, IntArray, IntArray]:
     """Pairs of samples and answers of one stamp: each answer, if no other is between, with the newest sample.
 
-    Args:
-        stamps: Of samples and answers [ns], shape (n,).
-        places: In the bag, shape (n,).
-        is_answer: Which are answers, shape (n,).
-
-    Returns:
-        Numbers of the answers that have a sample, of these samples, and of the samples that still wait for an answer.
+    Stamps [ns] and places in the bag are those of samples and answers, shape (n,). Returns the numbers of the answers
+    that have a sample, of these samples, and of the samples that still wait for an answer.
     """
     order = np.lexsort((places, stamps))
     same = np.diff(stamps[order]) == 0

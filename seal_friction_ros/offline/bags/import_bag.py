@@ -45,17 +45,11 @@ class ActuatorImport(NamedTuple):
 
 
 def convert_bag(bag: Path, out: Path, mapping: MappingFile, also: Collection[str] = ()) -> dict[str, ActuatorImport]:
-    """Convert a bag with standard messages.
+    """Convert a rosbag2 bag with standard messages to the bag ``out``, or to a folder with a bag for each actuator.
 
-    Args:
-        bag: Any rosbag2 bag, MCAP or SQLite.
-        out: Bag to write; with several actuators a folder with one bag each, by their names. Must not exist.
-        mapping: Mapping file of the machine.
-        also: Topics to copy as they are, for example the command of a controller.
-
-    Raises:
-        ValueError: The mapping does not fit the bag; one line that names file, actuator or topic. Nothing is written.
-        BagError: The bag cannot be read, or ``out`` exists or cannot be made.
+    Topics in ``also`` are copied as they are, for example the command of a controller. ValueError: the mapping does not
+    fit the bag; one line that names file, actuator or topic, and nothing is written; BagError: the bag cannot be read,
+    or ``out`` exists or cannot be made.
     """
     machine, state = machine_in(bag, mapping)
     topics = bag_topics(bag)
@@ -121,10 +115,8 @@ def _write(
 ) -> tuple[list[Counter[str]], list[str], list[Lowest], list[_Track]]:
     """Write what each actuator gets, its velocity from the first pressure and force sum on.
 
-    A recorder hears its topics one after the other, so the first messages of some are missing.
-
-    Returns:
-        Number of messages by topic, what messages lacked, and of each actuator its lowest pressures and its tracking.
+    A recorder hears its topics one after the other, so the first messages of some are missing. Returns the number of
+    messages by topic, what messages lacked, and of each actuator its lowest pressures and its tracking.
     """
     lowest = [Lowest() for _ in machine.actuators]
     tracks = [_Track() for _ in machine.actuators]

@@ -77,15 +77,9 @@ class Table(NamedTuple):
 
 
 def read_table(log: Path, columns: Sequence[tuple[str, int, str]], rig: Expected) -> Table:
-    """Read columns of a log.
+    """Read columns of a log: place in the rig file, number and name of each; a name counts where it is not empty.
 
-    Args:
-        log: The file.
-        columns: Place in the rig file, number and name of each wanted column; a name counts where it is not empty.
-        rig: What the rig file says of the table.
-
-    Raises:
-        ValueError: The log cannot be read or lacks a column; one line that names file and field or line.
+    ValueError: the log cannot be read or lacks a column; one line that names file and field or line.
     """
     with _opened(log) as lines:
         return _read(log, lines, columns, rig)

@@ -307,16 +307,8 @@ def in_order(
 ) -> Iterator[Located]:
     """Messages of blocks in order of log time; equal times in the order of the file.
 
-    Args:
-        file: The file.
-        blocks: From its `Layout`.
-        names: Its channels.
-        locate: Finds the messages of a block.
-        at_once: Least size of the blocks that are read together [bytes].
-        on_fault: Without it, an unreadable block is an error.
-
-    Raises:
-        ValueError: A block cannot be read, or too many overlap in time.
+    Blocks are read together until they have ``at_once`` [bytes]. ``locate`` finds the messages of a block. Without
+    ``on_fault``, an unreadable block is an error. ValueError: a block cannot be read, or too many overlap in time.
     """
     if names.channels:  # else blocks stay in file order: channels are described before their messages
         blocks = sorted(blocks, key=lambda block: block.first)

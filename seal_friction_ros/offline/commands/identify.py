@@ -81,8 +81,7 @@ NOT_FOR_KINDS = {'seal': 'seal', 'squeeze_force': 'squeeze-force', 'chambers': '
 def _kinds(arguments: argparse.Namespace) -> dict[str, Any]:
     """Options of several kinds of seals.
 
-    Raises:
-        ValueError: There is one, two have the same name, or an option is of one kind.
+    ValueError: there is one, two have the same name, or an option is of one kind.
     """
     from seal_friction_ros.core.identification.candidate_laws import SealKind
 

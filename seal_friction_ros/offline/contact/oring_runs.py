@@ -107,6 +107,9 @@ def compute_case(
 ) -> Computed:
     """Compute a case file, with a progress bar.
 
+    ValueError: the file is invalid or insufficient for a seal file, or the ring does not fit, does not seal or has no
+    equilibrium.
+
     Args:
         path: The case file.
         pressures: Increasing pressures instead of those in the file [Pa, gauge].
@@ -115,10 +118,6 @@ def compute_case(
         for_seal_file: Refuse a case without what `seal_document` needs, before computing; one without friction has
             `PRIOR`.
         for_samples: Refuse a case in which nothing is unknown, before computing.
-
-    Raises:
-        ValueError: The file is invalid or insufficient for a seal file, or the ring does not fit, does not seal or has
-            no equilibrium.
     """
     document = read_yaml(path)
     try:
@@ -192,14 +191,10 @@ def _profile(contact: WallContact) -> Profile:
 
 
 def seal_document(computed: Computed, spread: Spread | None = None) -> dict[str, Any]:
-    """Seal file whose law is a table over the computed pressures.
+    """Seal file whose law is a table over the computed pressures, of a case that was computed ``for_seal_file``.
 
-    Args:
-        computed: The case and its results, computed ``for_seal_file``.
-        spread: Of the friction, from samples; None: the uncertainty of its law.
-
-    Raises:
-        ValueError: It was not, or the friction falls with pressure.
+    The ``spread`` of the friction is that of samples; None: the uncertainty of its law. ValueError: the case was not
+    computed for it, or the friction falls with pressure.
     """
     file, law, friction = computed.file, computed.friction_law, computed.file.friction
     if law is None or friction is None:

@@ -47,8 +47,7 @@ class SealForces:
 def seal_of(path: Path) -> Seal:
     """Seal of a seal file, or of an O-ring case, which is computed.
 
-    Raises:
-        ValueError: The file is neither, or the case cannot be computed.
+    ValueError: the file is neither, or the case cannot be computed.
     """
     document = read_yaml(path)
     if isinstance(document, dict) and 'groove' in document:
@@ -62,8 +61,7 @@ def seal_of(path: Path) -> Seal:
 def seal_forces(path: Path, pressures: Sequence[float], speed: float, seals: int) -> SealForces:
     """Friction of ``seals`` equal seals at each pressure [Pa, gauge] and ``speed`` [m/s, 0: Coulomb friction].
 
-    Raises:
-        ValueError: As of `seal_of`.
+    ValueError: as of `seal_of`.
     """
     seal = seal_of(path)
     mounted = seals * (MountedSeal(seal, 'a'),)

@@ -105,8 +105,9 @@ def compare(
     """Compare a topic of two bags, each message with the one of the same stamp.
 
     Messages of equal stamp in one bag are paired in order, the last with the last, since recordings of one run mostly
-    begin at different times (our choice). Messages without a stamp (configurations) are paired in the same way.
-    Two numbers agree if ``|b - a| <= atol + rtol |a|`` or if both are NaN, other values if they are equal.
+    begin at different times (our choice). Messages without a stamp (configurations) are paired in the same way. Two
+    numbers agree if ``|b - a| <= atol + rtol |a|`` or if both are NaN, other values if they are equal. BagError: a bag
+    cannot be read or has no such topic, a message on it is of an unknown type, or no stamp is in both bags.
 
     Args:
         bag_a: First bag, the reference.
@@ -118,10 +119,6 @@ def compare(
             on estimates, and all fields on other messages.
         namespace: As of `open_actuator`.
         mapping: Likewise; then the estimates are made here.
-
-    Raises:
-        BagError: A bag cannot be read or has no such topic, a message on it is of an unknown type, or no stamp is in
-            both bags.
     """
     a, b = (_topic_of(bag, topic, namespace, mapping) for bag in (bag_a, bag_b))
     stamps_a, stamps_b = _stamps(a), _stamps(b)

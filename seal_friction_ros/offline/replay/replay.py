@@ -88,18 +88,12 @@ class Step(NamedTuple):
 
 
 class Replay:
-    """The machine of a bag on its way through the messages, and what it answers to each.
+    """The machine of a bag, or one actuator of it, on its way through the messages, and what it answers to each.
 
     A bag of ``friction_estimator`` is that of a machine with the built-in mapping. The machine is that of the newest
-    configuration in the bag. A bag without configuration is replayed by the default one, with the built-in mapping.
-
-    Args:
-        bag: The bag, or one actuator of it.
-        override: Configuration of each actuator instead of the recorded one.
-        namespace: Use only topics below it; the name of an actuator of a machine: that actuator alone.
-
-    Raises:
-        BagError: The bag cannot be read, or has not what the estimator needs.
+    configuration in the bag. A bag without configuration is replayed by the default one, with the built-in mapping. The
+    ``override`` is the configuration of each actuator instead of the recorded one; ``namespace`` as of `source_of`.
+    BagError: the bag cannot be read, or has not what the estimator needs.
     """
 
     def __init__(self, bag: Path | ActuatorBag, override: Configuration | None = None, namespace: str = '') -> None:
@@ -269,15 +263,8 @@ def replay(
     """Replay a bag and compare the answers with the recorded ones; with ``out``, write inputs and answers as a new bag.
 
     The new bag keeps the recorded feed-forward, which acted on the axis, on a topic whose name ends with `RECORDED`.
-
-    Args:
-        bag: The bag, of any machine.
-        override: Configuration instead of the recorded one, of every actuator.
-        out: Bag to write.
-        namespace: As of `Replay`.
-
-    Raises:
-        BagError: The bag cannot be read, or ``out`` exists already; then nothing is left at ``out``.
+    Other arguments as of `Replay`. BagError: the bag cannot be read, or ``out`` exists already; then nothing is left at
+    ``out``.
     """
     replayed = Replay(bag, override, namespace)
     with progress(f'replay {bag.name}', count_messages(replayed.topics)) as advance:

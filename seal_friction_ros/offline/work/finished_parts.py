@@ -86,15 +86,8 @@ def run_parts(
 ) -> list[Values]:
     """Results, in order, of parts that are of use only together; parts that are kept in ``folder`` are not computed.
 
-    Args:
-        label: Of the progress bar.
-        parts: The parts.
-        workers: Parts at a time, or a cluster.
-        folder: Keeps every finished part as a JSON file, also when a later part fails; None keeps none.
-        prepare: As of `try_all`, if a part is missing.
-
-    Raises:
-        ValueError: A part failed, or the folder or the cluster cannot be used.
+    The folder keeps every finished part as a JSON file, also when a later part fails; None keeps none. Other arguments
+    as of `try_all`. ValueError: a part failed, or the folder or the cluster cannot be used.
     """
     outcomes, missing = _found(parts, Kept(folder, retry_failed=True))
 

@@ -31,8 +31,7 @@ class Law(CheckedParameters):
     def check_together(self) -> None:
         """Check what the bounds of each parameter alone cannot; called once these hold.
 
-        Raises:
-            ValueError: Two parameters contradict each other.
+        ValueError: two parameters contradict each other.
         """
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -52,10 +52,8 @@ class NormalForceTable(NormalForceLaw):
     """Normal force by monotone interpolation of computed or measured values over pressure.
 
     Above the last pressure the normal force rises with the slope that it has there (our choice: rubber under pressure
-    behaves as a fluid, so the normal force keeps rising).
-
-    Raises:
-        ValueError: Fewer than two points, or pressures or forces that do not increase, or a force that is not positive.
+    behaves as a fluid, so the normal force keeps rising). ValueError: fewer than two points, or pressures or forces
+    that do not increase, or a force that is not positive.
     """
 
     function = staticmethod(normal_force_table)

@@ -19,10 +19,9 @@ def prior_art_chart(squeeze_part: float, table: Bound, projected_area: float, pr
 class PriorArtChart(FrictionLaw):
     """Coulomb friction read from charts: F = f_c L_r + f_h(P) A_r.
 
-    Source: thesis, chapter 2 (Tables 1 to 3); monotone interpolation between the chart readings is our choice.
+    ValueError: a chart value is out of bounds, or friction falls with pressure.
 
-    Raises:
-        ValueError: A chart value is out of bounds, or friction falls with pressure.
+    Source: thesis, chapter 2 (Tables 1 to 3); monotone interpolation between the chart readings is our choice.
     """
 
     NAME = 'prior_art_chart'
