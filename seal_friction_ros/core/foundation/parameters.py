@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar, cast
 
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.foundation.units import in_si, unit_meant
 
 Record = TypeVar('Record')
@@ -119,10 +120,8 @@ def from_mapping(record_type: type[Record], values: Any, where: str, **made: Any
         name: _as_declared(value, fields[name].type, f'{where}.{name}', units.get(name, ''))
         for name, value in values.items()
     }
-    try:
+    with named_errors(where):
         return record_type(**made, **converted)
-    except ValueError as error:
-        raise ValueError(f'{where}: {error}') from None
 
 
 def check_names(values: Mapping[Any, Any], known: Collection[str], where: str) -> None:

@@ -18,6 +18,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.foundation.parameters import check_names, printable
 
 KINDS = {'relative_std': 1, 'factor': 1, 'tolerance': 1, 'range': 2}
@@ -90,15 +91,11 @@ def parse_unknowns(
     if not isinstance(values, Mapping) or not values:
         raise ValueError(f'{where} is not a mapping of names to spreads but {values!r}')
     check_names(values, known, where)
-    try:
+    with named_errors(where):
         unknowns = tuple(Unknown(name, known[name], *_spread(name, spread)) for name, spread in values.items())
-    except ValueError as error:
-        raise ValueError(f'{where}: {error}') from None
     for name, end in ((unknown.name, end) for unknown in unknowns for end in unknown.ends):
-        try:
+        with named_errors(f'{where}: {name} = {end:.6g}'):
             vary({name: end})
-        except ValueError as error:
-            raise ValueError(f'{where}: {name} = {end:.6g}: {error}') from None
     return unknowns
 
 

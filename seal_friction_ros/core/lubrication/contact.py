@@ -24,7 +24,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.compiled import compiled
-from seal_friction_ros.core.foundation.errors import NotConvergedError
+from seal_friction_ros.core.foundation.errors import NotConvergedError, named_errors
 from seal_friction_ros.core.lubrication.elasticity import ElasticBody
 from seal_friction_ros.core.lubrication.flow_factors import (
     flow_factor_coefficients,
@@ -263,10 +263,8 @@ def _newton_change(
         by_gap, _, by_total = solved(y, none)
         return deflected(by_gap, by_total)
 
-    try:
+    with named_errors('contact step', StalledError, NotConvergedError):
         y = contact.solve(product, wanted, tolerance, _GMRES_ITERATIONS)
-    except StalledError as error:
-        raise NotConvergedError(f'contact step: {error}') from None
     more_gap, more_left, _ = solved(y, none)
     return gap + more_gap, left + more_left
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.integrate import trapezoid
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.errors import NotConvergedError
+from seal_friction_ros.core.foundation.errors import NotConvergedError, named_errors
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.lubrication.contact import ContactState, contact_step
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, MapGrid
@@ -142,10 +142,9 @@ def steady_friction(case: LubricationCase, pressure: float) -> SteadyFriction:
     for k, direction in enumerate((1.0, -1.0)):
         state = begin
         for i, speed in enumerate(speeds):
-            try:
+            where = f'case {case.name} at {speed:.4g} m/s, {pressure:.4g} Pa'
+            with named_errors(where, NotConvergedError, NotConvergedError):
                 state, more = steady_state(model, state, direction * float(speed))
-            except NotConvergedError as error:
-                raise NotConvergedError(f'case {case.name} at {speed:.4g} m/s, {pressure:.4g} Pa: {error}') from None
             retried += more
             values[k, :, i] = _friction(model, state, direction * float(speed))
     friction, solid = values.mean(axis=0)

@@ -14,7 +14,7 @@ from scipy.sparse import dia_array
 from scipy.sparse.linalg import splu
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.errors import NotConvergedError
+from seal_friction_ros.core.foundation.errors import NotConvergedError, named_errors
 from seal_friction_ros.core.oring_contact.equilibrium import (
     OringModel,
     OringState,
@@ -113,8 +113,6 @@ def small_displacements(
         size = len(assembly.free)
         matrix = matrix + dia_array((springs[None, assembly.free], np.zeros(1, int)), shape=(size, size))
     moved = np.zeros_like(loads)
-    try:
+    with named_errors('small_displacements: the stiffness is singular', RuntimeError, NotConvergedError):
         moved[assembly.free] = splu(matrix.tocsc()).solve(loads[assembly.free])
-    except RuntimeError as error:
-        raise NotConvergedError(f'small_displacements: the stiffness is singular: {error}') from None
     return moved

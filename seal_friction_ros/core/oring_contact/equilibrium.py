@@ -7,7 +7,7 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
-from seal_friction_ros.core.foundation.errors import NotConvergedError
+from seal_friction_ros.core.foundation.errors import NotConvergedError, named_errors
 from seal_friction_ros.core.oring_contact.elements import (
     Elements,
     deformation_gradient,
@@ -157,12 +157,10 @@ def solve_equilibrium(
         if imbalance < TOLERANCE:
             return OringState(state.displacement, now.tension), step
         matrix = stiffness_matrix(assembly, now.entries)
-        try:
+        with named_errors('the stiffness is singular', RuntimeError, NotConvergedError):
             factors = splu(
                 matrix, permc_spec='MMD_AT_PLUS_A', diag_pivot_thresh=_PIVOT, options={'SymmetricMode': True}
             )
-        except RuntimeError as error:
-            raise NotConvergedError(f'the stiffness is singular: {error}') from None
         state, now = _take_newton_step(model, surroundings, state, now, assembly.free, factors.solve(residual))
     raise NotConvergedError(f'residual of {imbalance:.1e} 2 pi R E d after {MAX_ITERATIONS} Newton steps')
 

@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.foundation.parameters import (
     CheckedParameters,
     check_names,
@@ -123,10 +124,8 @@ def _rubber(values: Any, where: str) -> Rubber:
     others = {key: value for key, value in values.items() if key != 'hardness'}
     if 'hardness' in values:
         hardness = from_mapping(_Hardness, {'hardness': values['hardness']}, where).hardness
-        try:
+        with named_errors(where):
             others['elastic_modulus'] = elastic_modulus_of_hardness(hardness)
-        except ValueError as error:
-            raise ValueError(f'{where}: {error}') from None
     return from_mapping(Rubber, others, where)
 
 

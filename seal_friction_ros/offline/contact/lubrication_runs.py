@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.errors import NotConvergedError
+from seal_friction_ros.core.foundation.errors import NotConvergedError, named_errors
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.presliding import presliding_of_map
@@ -62,10 +62,8 @@ def read_case(name: str, parse: Callable[[Any, Callable[[str], OringCaseFile]], 
     """
     path = config_path('ehl', name)
     document = read_yaml(path)
-    try:
+    with named_errors(path):
         return parse(document, lambda oring: load_oring(oring, path.parent))
-    except ValueError as error:
-        raise ValueError(f'{path}: {error}') from None
 
 
 def load_oring(name: str, beside: Path) -> OringCaseFile:

@@ -7,6 +7,7 @@ from pathlib import Path
 from statistics import linear_regression
 from typing import Any, NamedTuple
 
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.friction.actuator import Uncertainty
 from seal_friction_ros.core.friction.geometry import stretch_force
 from seal_friction_ros.core.friction.laws.contact_shear import ShearLaw
@@ -120,7 +121,7 @@ def compute_case(
         for_samples: Refuse a case in which nothing is unknown, before computing.
     """
     document = read_yaml(path)
-    try:
+    with named_errors(path):
         file = parse_oring_case(document)
         wanted = tuple(pressures) or file.pressures
         check_pressures(file.case, wanted)
@@ -138,8 +139,6 @@ def compute_case(
                 results.append(result)
                 advance(1)
         fitted = _fitted(file, results, readings) if readings else None
-    except ValueError as error:
-        raise ValueError(f'{path}: {error}') from None
     if fitted is not None:
         known = file.friction or PRIOR
         friction = dataclasses.replace(known, law=fitted.law, uncertainty=Uncertainty(fitted.relative_std))

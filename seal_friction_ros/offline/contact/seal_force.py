@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.actuator import MountedSeal, Seal, actuator_friction
@@ -52,10 +53,8 @@ def seal_of(path: Path) -> Seal:
     document = read_yaml(path)
     if isinstance(document, dict) and 'groove' in document:
         document = seal_document(compute_case(path, for_seal_file=True))
-    try:
+    with named_errors(path):
         return parse_seal(document)
-    except ValueError as error:
-        raise ValueError(f'{path}: {error}') from None
 
 
 def seal_forces(path: Path, pressures: Sequence[float], speed: float, seals: int) -> SealForces:
