@@ -215,13 +215,21 @@ def outputs(
 
 
 @compiled
+def _step_measured(
+    kept: Any, state: ServoState, measured: Measurement, reference: Setpoint, feedforward: float, load_force: float
+) -> tuple[ServoState, ServoOutputs]:
+    c, g, time, steps, elastic = kept.value
+    controller, command = control(g, c, state.controller, measured, reference, feedforward)
+    plant, shear = _advance_elastic(c, elastic, (time, steps), state.plant, state.seals, (command.spool, load_force))
+    return ServoState(plant, controller, shear), _outputs(kept, plant, shear, command, load_force)
+
+
+@compiled
 def _step(
     kept: Any, state: ServoState, reference: Setpoint, feedforward: float, load_force: float
 ) -> tuple[ServoState, ServoOutputs]:
-    c, g, time, steps, elastic = kept.value
-    controller, command = control(g, c, state.controller, measure(c, state.plant), reference, feedforward)
-    plant, shear = _advance_elastic(c, elastic, (time, steps), state.plant, state.seals, (command.spool, load_force))
-    return ServoState(plant, controller, shear), _outputs(kept, plant, shear, command, load_force)
+    measured = measure(kept.value[0], state.plant)
+    return _step_measured(kept, state, measured, reference, feedforward, load_force)
 
 
 def step(
@@ -240,21 +248,11 @@ def step(
     return _step(parameters.kept, state, reference, feedforward, load_force)
 
 
-@compiled
-def _step_measured(
-    kept: Any, state: ServoState, measured: Measurement, reference: Setpoint, feedforward: float
-) -> tuple[ServoState, ServoOutputs]:
-    c, g, time, steps, elastic = kept.value
-    controller, command = control(g, c, state.controller, measured, reference, feedforward)
-    plant, shear = _advance_elastic(c, elastic, (time, steps), state.plant, state.seals, (command.spool, 0.0))
-    return ServoState(plant, controller, shear), _outputs(kept, plant, shear, command, 0.0)
-
-
 def step_measured(
     parameters: ServoParameters, state: ServoState, measured: Measurement, reference: Setpoint, feedforward: float = 0.0
 ) -> tuple[ServoState, ServoOutputs]:
     """As `step`, but the controller has the measurement of real sensors."""
-    return _step_measured(parameters.kept, state, measured, reference, feedforward)
+    return _step_measured(parameters.kept, state, measured, reference, feedforward, 0.0)
 
 
 class Trajectory(NamedTuple):

@@ -42,10 +42,7 @@ class PriorArtChart(FrictionLaw):
 
     def check_together(self) -> None:
         """Check that the friction does not fall with pressure."""
-        if list(self.pressure_frictions) != sorted(self.pressure_frictions):
-            raise ValueError(
-                f'PriorArtChart.pressure_frictions = {list(self.pressure_frictions)} Pa falls with pressure'
-            )
+        self.check_rises('pressure_frictions')
 
     @cached_property
     def table(self) -> MonotoneTable:
