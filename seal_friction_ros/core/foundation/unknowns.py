@@ -100,7 +100,6 @@ def parse_unknowns(
 
 
 def _spread(name: str, spread: Any) -> tuple[str, tuple[float, ...]]:
-    """Kind and amounts of a spread."""
     if not isinstance(spread, Mapping) or len(spread) != 1 or next(iter(spread)) not in KINDS:
         raise ValueError(f'{name} = {printable(spread)} is none of {", ".join(f"{{{kind}: ...}}" for kind in KINDS)}')
     ((kind, given),) = spread.items()

@@ -39,14 +39,14 @@ def o_grid(section_diameter: float, center_radius: float, lines: int) -> Mesh:
     r_sides = max(2, round(AXIAL_SHARE * z_sides))
     layers = max(2, round(0.5 * z_sides))
     position, index = _core(r_sides, z_sides)
-    around = _outline(index)
+    around = np.roll(outline_of(index), index.shape[1] // 2)  # from the middle of the side nearest to the axis
     circle = position[around] / np.linalg.norm(position[around], axis=1, keepdims=True)
     share = np.cumsum(np.geomspace(1.0, LAYER_RATIO, layers))
     nodes, rows = [position], [around]
     for layer, fraction in enumerate(share / share[-1]):
         nodes.append((1.0 - fraction) * position[around] + fraction * circle)
         rows.append(len(position) + layer * len(around) + np.arange(len(around)))
-    blocks = [_core_quadrilaterals(index), *(_layer_quadrilaterals(a, b) for a, b in pairwise(rows))]
+    blocks = [quadrilaterals_of(index), *(_layer_quadrilaterals(a, b) for a, b in pairwise(rows))]
     center = np.array([center_radius, 0.0])
     return Mesh(center + section_diameter / 2.0 * np.concatenate(nodes), np.concatenate(blocks), rows[-1])
 
@@ -70,16 +70,13 @@ def _tangents(sides: int) -> FloatArray:
     return np.tan(angle)
 
 
-def _outline(index: IntArray) -> IntArray:
-    """Indices around the core, counterclockwise from the middle of the side nearest to the axis.
-
-    With an odd number of edges on that side, the first index is the node after the middle.
-    """
-    loop = np.concatenate((index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]))
-    return np.roll(loop, index.shape[1] // 2)
+def outline_of(index: IntArray) -> IntArray:
+    """Indices around a grid of them, counterclockwise from its first corner."""
+    return np.concatenate((index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]))
 
 
-def _core_quadrilaterals(index: IntArray) -> IntArray:
+def quadrilaterals_of(index: IntArray) -> IntArray:
+    """Corners of the quadrilaterals of a grid of indices, shape (e, 4)."""
     corners = (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:])
     return np.stack([corner.ravel() for corner in corners], axis=1)
 

@@ -114,7 +114,10 @@ def parse_oring_case(document: Any) -> OringCaseFile:
     check_pressures(case, pressures)
     friction = _friction(document, where)
     unknown = _unknown(document, case, friction is not None, where)
-    return OringCaseFile(case, pressures, source, friction, _measured(document, where), unknown)
+    measured = document.get('measured')
+    if measured is not None:
+        measured = from_mapping(MeasuredFriction, measured, f'{where}: measured')
+    return OringCaseFile(case, pressures, source, friction, measured, unknown)
 
 
 def _rubber(values: Any, where: str) -> Rubber:
@@ -162,11 +165,6 @@ def _friction(document: Mapping[str, Any], where: str) -> SealFriction | None:
     stiction = from_mapping(_Stiction, {k: v for k, v in values.items() if k.startswith('stiction')}, where)
     uncertainty = from_mapping(Uncertainty, values.get('uncertainty'), f'{where}: uncertainty')
     return SealFriction(law, uncertainty, stiction.stiction, stiction.stiction_ratio)
-
-
-def _measured(document: Mapping[str, Any], where: str) -> MeasuredFriction | None:
-    values = document.get('measured')
-    return None if values is None else from_mapping(MeasuredFriction, values, f'{where}: measured')
 
 
 # -- what is not known ------------------------------------------------------------------------------------------------

@@ -121,9 +121,7 @@ def _axial_force(pressure: walls.SurfacePressure, axial_areas: FloatArray, upstr
 
 def _upstream(loaded: LoadedRing, position: FloatArray) -> BoolArray:
     """Nodes on the fluid side; without pressure, the upstream half (z < 0)."""
-    if loaded.pressure > 0.0:
-        return loaded.surroundings.wetted
-    return position[:, 1] < 0.0
+    return loaded.surroundings.wetted if loaded.pressure > 0.0 else position[:, 1] < 0.0
 
 
 def _contact(loaded: LoadedRing, position: FloatArray, wall: int) -> WallContact:

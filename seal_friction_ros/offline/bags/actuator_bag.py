@@ -186,7 +186,6 @@ def _opened(
     count: int,
     mapping: MappingFile | None = None,
 ) -> ActuatorBag:
-    """One of ``count`` actuators."""
     topics = _topics_of(actuator, infos, has_mapping=mapping is not None)
     if not topics.velocity:
         raise rosbag.BagError(no_velocity(bag, actuator.name))
@@ -320,7 +319,6 @@ class _OfActuator:
         return message._replace(topic=self._topics.configuration, data=coder.encode_text(snapshot_text(snapshot)))
 
     def _encoded(self, message: rosbag.BagMessage, made: Iterable[tuple[Any, bytes]]) -> Iterator[rosbag.BagMessage]:
-        """Records as messages of the actuator."""
         for record, frame_id in made:
             kind = coder.type_of(record)
             self._has_velocity |= kind == layouts.VELOCITY_TYPE

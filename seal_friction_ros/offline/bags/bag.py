@@ -64,11 +64,6 @@ class BagError(ValueError):
     """A bag that cannot be read or written; one line that says which and why."""
 
 
-def message_error(bag: Path, message: BagMessage, error: ValueError) -> BagError:
-    """Error of a message, with its name."""
-    return BagError(f'{bag}: message on {message.topic} at {message.log_time} ns: {error}')
-
-
 @contextmanager
 def named(bag: Path, message: BagMessage) -> Iterator[None]:
     """Convert the error of a message to one that names it."""
@@ -77,7 +72,7 @@ def named(bag: Path, message: BagMessage) -> Iterator[None]:
     except BagError:
         raise
     except ValueError as error:
-        raise message_error(bag, message, error) from None
+        raise BagError(f'{bag}: message on {message.topic} at {message.log_time} ns: {error}') from None
 
 
 def timed_name(name: str) -> str:

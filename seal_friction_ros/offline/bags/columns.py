@@ -84,14 +84,12 @@ def collected(
     kinds = {one.topic: (kind, one.type_name) for kind, one in enumerate(wanted.values(), start=1) if one.topic}
 
     def kind_of(topic: str, type_name: str) -> int:
-        """Kind of the messages on a topic."""
         kind, known = kinds.get(topic, (0, type_name))
         if type_name != known:
             raise UnsuitedError(f'{topic} has messages of {known} and of {type_name}')
         return kind
 
     def fill(blocks: Iterable[Messages]) -> _Collector:
-        """Collector of all blocks."""
         collector = make()
         with progress(f'read {bag.path.name}', bag.total) as advance:
             for block in blocks:
@@ -160,7 +158,6 @@ class _VelocityCollector:
         self._configuration: Configuration | None = None
 
     def add(self, block: Block) -> None:
-        """Take one block."""
         for _, _, text in block.decoded('configuration', decode_text):
             self._configuration = parse_snapshot(text).configuration
         found = {name: block.of(name) for name in INPUTS}
@@ -169,7 +166,6 @@ class _VelocityCollector:
         extend(self._columns, self._held.at(found['velocity'].places, found))
 
     def rows(self) -> VelocityRows:
-        """All rows."""
         columns = np.array([np.frombuffer(column) for column in self._columns])
         stamps, received = (np.frombuffer(times, np.int64) for times in (self._stamps, self._received))
         return VelocityRows(stamps, received, columns, self._configuration)

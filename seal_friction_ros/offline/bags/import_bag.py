@@ -81,7 +81,6 @@ class _Track:
         self._measured = array('d')
 
     def take(self, record: Input) -> None:
-        """Take one record."""
         if isinstance(record, ServoReference):
             self._wanted.extend((record.stamp, record.position))
         elif isinstance(record, Position):

@@ -333,7 +333,6 @@ def in_order(
 def _read(
     file: BinaryIO, blocks: Sequence[Block], names: Names, locate: Locate, on_fault: OnFault | None
 ) -> Iterator[Located]:
-    """Messages of each block."""
     for block in blocks:
         try:
             data = _unpacked(file, block)
@@ -351,7 +350,6 @@ def _alone(data: bytes, rows: Integers) -> Located:
 
 
 def _joined(parts: Sequence[Located]) -> Located:
-    """Messages of all parts."""
     starts = accumulate((len(part.data) for part in parts), initial=0)
     rows = [np.add(part.rows, [[0], [start], [0], [0], [0]]) for part, start in zip(parts, starts, strict=False)]
     return Located(b''.join(part.data for part in parts), np.concatenate([np.empty((5, 0), np.int64), *rows], axis=1))

@@ -86,7 +86,6 @@ def _parts(name: str) -> list[str | int]:
 
 
 def _copy(path: Path, writer: BagWriter, found: Recovery) -> None:
-    """Copy the readable messages of one file."""
     descriptions: dict[tuple[str, str], Description] = {}
 
     def on_fault(block: Block, reason: str) -> None:

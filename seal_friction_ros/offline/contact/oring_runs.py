@@ -30,7 +30,7 @@ from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty as Spread
 from seal_friction_ros.offline.contact.uncertainty import check_unknown
 from seal_friction_ros.offline.work.progress import progress
-from seal_friction_ros.offline.work.seal_writer import rounded
+from seal_friction_ros.offline.work.seal_writer import rounded, rounded_numbers
 
 DIGITS = 8  # of a computed number in a seal file
 
@@ -207,22 +207,13 @@ def seal_document(computed: Computed, spread: Spread | None = None) -> dict[str,
         'name': file.case.name,
         'source': ' '.join(source.split()),
         'geometry': asdict(file.case.geometry),
-        **_rounded(law_document(law)),
+        **rounded_numbers(law_document(law), DIGITS),
         'stiction': friction.stiction,
         **({'stiction_ratio': rounded(friction.stiction_ratio, 3)} if friction.stiction_ratio else {}),
         'uncertainty': asdict(friction.uncertainty) | {'relative_std': rounded(found, 3)},
         'identified_pressure': [pressures[0], pressures[-1]],
         **({'identified_speed': [min(speeds), max(speeds)]} if speeds else {}),
     }
-
-
-def _rounded(value: Any) -> Any:
-    """A document with numbers of `DIGITS` digits."""
-    if isinstance(value, dict):
-        return {key: _rounded(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_rounded(item) for item in value]
-    return rounded(value, DIGITS) if isinstance(value, float) else value
 
 
 def seal_comment(computed: Computed) -> str:

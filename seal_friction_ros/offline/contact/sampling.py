@@ -106,7 +106,6 @@ def uncertain_ring(
     names, drawn = _drawn(case.name, file.unknown, samples, seed)
 
     def parts_of(values: Mapping[str, float]) -> list[Part]:
-        """The one part of a sample."""
         varied = varied_ring(case, values)
         check_pressures(varied, pressures)
         key = part_key('ring', [asdict(varied), pressures, type(law).__name__, asdict(law) if law else {}])

@@ -160,7 +160,6 @@ class _Observer(Run):
     """Estimator with ``adaptation.mode`` observe, which keeps what it has learnt when the configuration changes."""
 
     def configure(self, snapshot: Snapshot) -> None:
-        """Take a recorded configuration."""
         learnt = self.state.estimator.adaptation
         super().configure(snapshot._replace(configuration=_observing(snapshot.configuration)))
         self.state.estimator.adaptation = learnt

@@ -39,7 +39,6 @@ class _Topic(NamedTuple):
     read: Callable[[], Iterator[BagMessage]]
 
     def messages(self) -> Iterator[BagMessage]:
-        """Its messages."""
         return (message for message in self.read() if message.topic == self.name)
 
 
@@ -131,7 +130,7 @@ def compare(
     own: dict[str, float | None] = dict(tolerances or {})
     for number, one, other in _decoded_pairs((a, numbers_a), (b, numbers_b)):
         identical = identical and one[0] == other[0]
-        own = own or _usual(one[1])
+        own = own or dict.fromkeys(FRICTION_FIELDS if {*FRICTION_FIELDS} <= one[1].keys() else one[1])
         for name, value in one[1].items():
             then, absolute = other[1].get(name), own.get(name)
             difference, within = _difference(value, then, atol if absolute is None else absolute, rtol)
@@ -148,11 +147,6 @@ def compare(
     if unknown := [name for name in own if name not in fields]:
         raise BagError(f'{topics}: no field {unknown[0]!r} to compare: there are {", ".join(fields)}')
     return BagComparison(topics, *counts, pairs, identical, first, fields, tuple(own))
-
-
-def _usual(message: Mapping[str, Any]) -> dict[str, float | None]:
-    """Fields that decide by default."""
-    return dict.fromkeys(FRICTION_FIELDS if set(FRICTION_FIELDS) <= set(message) else message)
 
 
 def _pairs(stamps_a: _Numbers, stamps_b: _Numbers) -> tuple[_Numbers, _Numbers]:

@@ -162,7 +162,6 @@ def kinds_of_topics(topics: Topics) -> KindOf:
     }
 
     def kind_of(topic: str, type_name: str) -> Kind:
-        """Kind of the messages on a topic."""
         other = Kind.OTHER_ESTIMATE if type_name == ESTIMATE_TYPE else Kind.OTHER
         wanted, kind = known.get(topic, (type_name, other))
         if topic == topics.clock:

@@ -214,10 +214,11 @@ class Replay:
             return ()
         try:
             record = plan.read(message.data)
-        except ValueError as error:
+        except ValueError:
             if self.has_names:  # as the node: it counts the message as malformed
                 return ()
-            raise rosbag.message_error(self._bag, message, error) from None
+            with rosbag.named(self._bag, message):
+                raise
         self._made.clear()
         self._state = receive(
             self._machine, self._state, plan, record, message.log_time, self._collect, message.publish_time

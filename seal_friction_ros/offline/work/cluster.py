@@ -73,7 +73,6 @@ class _Running:
         self._start = (str(Path.cwd()), dict(versions()))
 
     def begin(self, number: int) -> None:
-        """Send a call."""
         call = self._calls[number]
         future = self._client.submit(_run, call, _paths_here(call), *self._start, pure=False)
         self.futures[number] = future
@@ -104,7 +103,6 @@ class _Running:
         return number, answer
 
     def forget_after(self, number: int) -> None:
-        """Forget the calls after this one."""
         for later in [one for one in self.futures if one > number]:
             self.futures.pop(later).release()
 

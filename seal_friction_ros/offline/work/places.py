@@ -8,12 +8,12 @@ import hashlib
 import json
 import re
 import signal
+import sys
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import FrameType
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
@@ -142,12 +142,8 @@ def _ended_in_order() -> Iterator[None]:
     signals = [one for one in (signal.SIGTERM, signal.SIGINT) if signal.getsignal(one) is signal.SIG_DFL]
     try:
         for one in signals:
-            signal.signal(one, _end)
+            signal.signal(one, lambda number, _: sys.exit(128 + number))
         yield
     finally:
         for one in signals:
             signal.signal(one, signal.SIG_DFL)
-
-
-def _end(number: int, _: FrameType | None) -> None:
-    raise SystemExit(128 + number)
