@@ -3,8 +3,7 @@
 import json
 from typing import Any
 
-DEEPEST = 40
-"""Levels of a document: our choice; those of this package have less than 12, and Python ends at some 1000."""
+DEEPEST = 40  # Levels of a document: our choice; those of this package have less than 12, and Python ends at some 1000.
 
 
 class NotJsonError(ValueError):

@@ -65,8 +65,7 @@ class MonotoneTable:
         self.knots: Column = tuple(float(v) for v in spline.x)
         self.cubic, self.square, self.slope, self.value = (tuple(map(float, row)) for row in spline.c)
         self.last = float(y[-1])
-        self.end_slope = float(spline.derivative()(x[-1]))
-        """Slope at the last point, in units of y over x."""
+        self.end_slope = float(spline.derivative()(x[-1]))  # Slope at the last point, in units of y over x.
         self.slope_beyond = self.end_slope if rises else 0.0
         self.bound = bound(interpolated, self)
 

@@ -37,8 +37,7 @@ QUANTITIES: dict[str, tuple[str, ...]] = {quantity: tuple(sizes) for quantity, s
 """Quantity -> its units, that of SI first."""
 QUANTITY_OF: dict[str, str] = {unit: quantity for quantity, units in QUANTITIES.items() for unit in units}
 """Name of a unit -> its quantity."""
-ZEROS = {'K': 0.0, 'degC': 273.15}
-"""Unit of temperature -> its zero [K]."""
+ZEROS = {'K': 0.0, 'degC': 273.15}  # Unit of temperature -> its zero [K].
 _TEXT = re.compile(r'([-+]?(?:\d+(?:\.\d*)?|\.\d+)(e[-+]?\d+)?) *([a-z][\w/^ ()*]*)?', re.IGNORECASE)
 
 

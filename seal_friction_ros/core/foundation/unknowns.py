@@ -21,8 +21,7 @@ from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.foundation.parameters import check_names, printable
 
-KINDS = {'relative_std': 1, 'factor': 1, 'tolerance': 1, 'range': 2}
-"""Numbers that each kind of spread has."""
+KINDS = {'relative_std': 1, 'factor': 1, 'tolerance': 1, 'range': 2}  # Numbers that each kind of spread has.
 _MOST = {'relative_std': 10.0, 'factor': 1000.0}
 _LARGEST = 1e15  # of any amount
 _ENDS = np.array([0.005, 0.995])  # shares at which a case has to be possible (our choice)

@@ -36,8 +36,7 @@ from seal_friction_ros.core.foundation.parameters import CheckedParameters, para
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.states import BREAKAWAY, SLIDING, STUCK, StateFriction, sign, state_friction
 
-SLOTS = 6
-"""Largest number of elements: records of fixed size compile, and go into a snapshot."""
+SLOTS = 6  # Largest number of elements: records of fixed size compile, and go into a snapshot.
 
 
 class Elements(NamedTuple):

@@ -45,8 +45,7 @@ _ROUNDING = 2e-15  # relative
 _LEAST_FLOW = 1e-25  # [m^2/s] lower limit of the reference flow: a dry contact has none
 _COMPLEMENTARITY_TOLERANCE = 1e-13
 _PRESSURE_SCALE = 1e5  # [Pa] p_s of the complementarity
-THINNEST = 1e-9
-"""[m] a gap below this flows like this"""
+THINNEST = 1e-9  # [m] a gap below this flows like this
 
 
 Solver = Callable[[Callable[[FloatArray], FloatArray], FloatArray, float, int], FloatArray]

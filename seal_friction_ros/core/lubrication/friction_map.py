@@ -27,14 +27,12 @@ _PASSAGES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0, 100.0, math.inf)  #
 _MOST_RETRIES = 20
 _MEMORY_STEPS = 200
 _LONG_PASSAGES = 250.0  # a step of so many is nearly one to the steady film
-DISCRETISATION = 0.03
-"""[-] of the friction: what counts as an error of mesh and grid (our choice)"""
+DISCRETISATION = 0.03  # [-] of the friction: what counts as an error of mesh and grid (our choice)
 PERCOLATION = 0.42
 """[-] real contact above which the contact leaves the lubricant no way through.
 
 Source: W. B. Dapp, A. Lücke, B. N. J. Persson, M. H. Müser 2012: the flow ends where the contact percolates."""
-THINNEST_OF_CLOSURES = 0.5
-"""[-] gap over rms roughness from which the flow factors of Patir and Cheng hold"""
+THINNEST_OF_CLOSURES = 0.5  # [-] gap over rms roughness from which the flow factors of Patir and Cheng hold
 
 
 class SteadyFriction(NamedTuple):

@@ -91,8 +91,7 @@ class MapGrid(CheckedParameters):
 class LubricationCase:
     """One seal, its wall and lubricant; ValueError: two parts contradict each other."""
 
-    OPTIONAL: ClassVar[Mapping[str, type]] = {}
-    """parts that act only if a case file names them"""
+    OPTIONAL: ClassVar[Mapping[str, type]] = {}  # parts that act only if a case file names them
 
     name: str
     source: str = ''
@@ -104,8 +103,7 @@ class LubricationCase:
     motion: ReferenceMotion = field(default_factory=ReferenceMotion)
     numerics: LubricationNumerics = field(default_factory=LubricationNumerics)
     map: MapGrid = field(default_factory=MapGrid)
-    oring: OringCase | None = None
-    """finite-element ring in the place of the profile of ``seal``"""
+    oring: OringCase | None = None  # finite-element ring in the place of the profile of ``seal``
     unknown: tuple[Unknown, ...] = ()
     """numbers that are not known exactly, those of the ring with ``oring.`` before their names"""
 

@@ -63,8 +63,7 @@ _REFERENCE = tuple(_PLACE[f'reference_{name}'] for name in ('position', 'velocit
 
 KEPT = (Pressure, Force)  # records that are kept for the next velocity, and no more
 
-Emit = Callable[[str, Output, bytes], object]
-"""Takes an answer: name of the actuator, record, frame name."""
+Emit = Callable[[str, Output, bytes], object]  # Takes an answer: name of the actuator, record, frame name.
 
 
 class Wiring(NamedTuple):

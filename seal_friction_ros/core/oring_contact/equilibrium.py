@@ -19,10 +19,8 @@ from seal_friction_ros.core.oring_contact.material import Rubber
 from seal_friction_ros.core.oring_contact.mesh import Mesh
 from seal_friction_ros.core.oring_contact.surroundings import Surroundings, outline_freedoms, surface_forces
 
-TOLERANCE = 1e-9
-"""Largest residual force at a node over 2 pi R E d (our choice)."""
-MAX_ITERATIONS = 25
-"""Limit of Newton steps (our choice: good load steps take 3 to 8)."""
+TOLERANCE = 1e-9  # Largest residual force at a node over 2 pi R E d (our choice).
+MAX_ITERATIONS = 25  # Limit of Newton steps (our choice: good load steps take 3 to 8).
 _SHORTEST_STEP = 1.0 / 64.0  # of the full Newton step, below which an inverted element is an error
 _PIVOT = 0.01  # diagonal entry over the largest of its column, above which it is the pivot: little fill-in
 

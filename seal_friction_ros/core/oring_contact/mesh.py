@@ -7,10 +7,8 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 
-CORE = 0.5
-"""Half width of the core over the section radius (our choice: well-shaped elements)."""
-ROUNDING = 0.4
-"""Bending of the core's sides towards a circle, 0 to 1 (our choice: well-shaped elements)."""
+CORE = 0.5  # Half width of the core over the section radius (our choice: well-shaped elements).
+ROUNDING = 0.4  # Bending of the core's sides towards a circle, 0 to 1 (our choice: well-shaped elements).
 LAYER_RATIO = 0.5
 """Thickness of the outermost over that of the innermost layer (our choice: the contact is at the surface)."""
 CROWDING = 0.4

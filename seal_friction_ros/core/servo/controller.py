@@ -39,18 +39,12 @@ from seal_friction_ros.core.servo.pneumatics import (
 class Limited(IntFlag):
     """Fault or limit of a reference, a feed-forward or a command; 0: none."""
 
-    REFERENCE_NOT_FINITE = 1
-    """the last good position is held"""
-    REFERENCE_OUT_OF_STROKE = 2
-    """clamped short of the stops"""
-    REFERENCE_TOO_FAST = 4
-    """position follows at the largest speed; velocity or acceleration clamped"""
-    FEEDFORWARD_NOT_FINITE = 8
-    """counts as 0 N"""
-    FORCE = 16
-    """force command clamped to the force of the supply pressure"""
-    SPOOL = 32
-    """spool command clamped to full opening"""
+    REFERENCE_NOT_FINITE = 1  # the last good position is held
+    REFERENCE_OUT_OF_STROKE = 2  # clamped short of the stops
+    REFERENCE_TOO_FAST = 4  # position follows at the largest speed; velocity or acceleration clamped
+    FEEDFORWARD_NOT_FINITE = 8  # counts as 0 N
+    FORCE = 16  # force command clamped to the force of the supply pressure
+    SPOOL = 32  # spool command clamped to full opening
 
 
 @dataclass(frozen=True)

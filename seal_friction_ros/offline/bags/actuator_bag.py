@@ -71,8 +71,7 @@ class Topics(NamedTuple):
         return f'{(self.configuration or rosbag.CONFIGURATION_TOPIC).rpartition("/")[0]}/{rosbag.STATE_NAME}'
 
 
-TYPES = Topics(*(getattr(layouts, f'{name.upper()}_TYPE') for name in Topics._fields))
-"""Message type of each topic."""
+TYPES = Topics(*(getattr(layouts, f'{name.upper()}_TYPE') for name in Topics._fields))  # Message type of each topic.
 
 
 def find_topics(bag: Path, namespace: str = '', infos: Mapping[str, rosbag.TopicInfo] | None = None) -> Topics:

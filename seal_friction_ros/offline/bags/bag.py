@@ -48,8 +48,7 @@ STATE_NAME = 'state'  # last part of the name of the topic of states, beside ``c
 STATE_TYPE = 'std_msgs/msg/String'  # laid out as a configuration, and not taken for one
 STATE_PERIOD = 60.0  # [s] of log time between two of them in a bag that is written here
 
-START_IN_NAME = re.compile(r'_[0-9]{8}_[0-9]{6}_[0-9]{6}\Z')
-"""Time of the start at the end of the name of a bag."""
+START_IN_NAME = re.compile(r'_[0-9]{8}_[0-9]{6}_[0-9]{6}\Z')  # Time of the start at the end of the name of a bag.
 
 LARGEST_METADATA = 1 << 20  # [bytes] of metadata.yaml, with some 5000 files or 1000 topics
 _FOLDER_MODE = 0o750  # of a bag, less what the umask of the process forbids
@@ -357,8 +356,7 @@ def read_messages(path: Path) -> Iterator[BagMessage]:
             yield message._replace(data=mcap_reader.unpack_zstd(message.data)) if is_packed else message
 
 
-KindOf = Callable[[str, str], int]
-"""Topic and message type -> kind of its messages, for example a `Kind`; below 255."""
+KindOf = Callable[[str, str], int]  # Topic and message type -> kind of its messages, for example a `Kind`; below 255.
 
 
 def gathered(messages: Iterable[BagMessage], kind_of: KindOf) -> Iterator[Messages]:
@@ -377,10 +375,8 @@ class Storage(NamedTuple):
     """Files of a bag and how to read them."""
 
     files: tuple[Path, ...]
-    reader: Any
-    """`mcap_reader` or `sqlite_reader`: `file_messages` and `file_channels` of a file"""
-    packed: str
-    """what is compressed by zstd: ``none``, each ``message`` or each ``file``"""
+    reader: Any  # `mcap_reader` or `sqlite_reader`: `file_messages` and `file_channels` of a file
+    packed: str  # what is compressed by zstd: ``none``, each ``message`` or each ``file``
 
     @property
     def is_plain_mcap(self) -> bool:
@@ -394,8 +390,7 @@ class Storage(NamedTuple):
                 yield from getattr(self.reader, function)(plain)
 
 
-_READERS = {'mcap': mcap_reader, 'sqlite3': sqlite_reader}
-"""Storage identifier of rosbag2 -> its reader."""
+_READERS = {'mcap': mcap_reader, 'sqlite3': sqlite_reader}  # Storage identifier of rosbag2 -> its reader.
 
 
 class TopicInfo(NamedTuple):

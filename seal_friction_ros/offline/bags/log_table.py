@@ -26,8 +26,7 @@ _HEAD = 1000  # lines in which header and first row are looked for
 _SHOWN = 40  # characters of an invalid cell in an error message
 _COMMA = re.compile(r'[-+]?\d*,\d+(?:[eE][-+]?\d+)?')
 
-Lines = Iterator[tuple[int, str]]
-"""Number and text of each line, without empty ones."""
+Lines = Iterator[tuple[int, str]]  # Number and text of each line, without empty ones.
 
 
 class Expected(NamedTuple):

@@ -250,8 +250,7 @@ class Located(NamedTuple):
     from 2^63 on is negative."""
 
 
-Locate = Callable[[bytes, Block, Names], Integers]
-"""`located`, or the same compiled."""
+Locate = Callable[[bytes, Block, Names], Integers]  # `located`, or the same compiled.
 
 
 def located(data: bytes, block: Block, names: Names, on_wrong_time: Callable[[int], None] | None = None) -> Integers:
@@ -283,8 +282,7 @@ def located(data: bytes, block: Block, names: Names, on_wrong_time: Callable[[in
     return np.frombuffer(found, np.int64).reshape(-1, 5).T
 
 
-OnFault = Callable[[Block, str], None]
-"""Called with each unreadable block and the reason."""
+OnFault = Callable[[Block, str], None]  # Called with each unreadable block and the reason.
 
 
 def messages(

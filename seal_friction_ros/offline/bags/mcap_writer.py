@@ -59,8 +59,7 @@ class _Chunk:
 
     def __init__(self) -> None:
         self.data = bytearray()
-        self.first_time = self.last_time = 0
-        """log times of the first and the last message [ns]"""
+        self.first_time = self.last_time = 0  # log times of the first and the last message [ns]
         self._index: dict[int, list[tuple[int, int]]] = {}  # channel -> log time and offset of each of its messages
 
     def add(self, channel: int, log_time: int, publish_time: int, data: bytes) -> None:
@@ -115,8 +114,7 @@ class McapOutput:
             self._stream.close()
             path.unlink(missing_ok=True)
             raise
-        self.counts: dict[tuple[str, str], int] = {}
-        """topic and type -> messages"""
+        self.counts: dict[tuple[str, str], int] = {}  # topic and type -> messages
         self.first_time = self._last_time = self._pending = 0
         self._channels: dict[tuple[str, str], int] = {}  # topic and type -> number
         self._schema_records, self._channel_records, self._chunk_entries = list[bytes](), list[bytes](), list[bytes]()

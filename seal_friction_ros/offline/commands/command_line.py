@@ -101,8 +101,7 @@ def _help(description: str, examples: Sequence[str]) -> dict[str, Any]:
     return {**shown, 'formatter_class': argparse.RawDescriptionHelpFormatter}
 
 
-Settings = dict[str, Any]
-"""Of an option, as of `argparse`."""
+Settings = dict[str, Any]  # Of an option, as of `argparse`.
 
 
 def add_options(parser: Any, table: Mapping[str, tuple[str, Settings]]) -> None:

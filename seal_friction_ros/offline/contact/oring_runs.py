@@ -51,20 +51,15 @@ class OringSummary:
     case: str
     sliding_wall: str
     pressure_Pa: tuple[float, ...]
-    normal_force_N: tuple[float, ...]
-    """integral of the contact stress over the sliding wall"""
-    wall_force_N: tuple[float, ...]
-    """integral of all stress of that wall where it is above the pressure of the fluid"""
+    normal_force_N: tuple[float, ...]  # integral of the contact stress over the sliding wall
+    wall_force_N: tuple[float, ...]  # integral of all stress of that wall where it is above the pressure of the fluid
     stretch_force_N: float  # of the ring stretched over its inner wall, by the hoop equation of the thesis
-    axial_force_N: tuple[float, ...]
-    """axial force of the gland on the ring"""
+    axial_force_N: tuple[float, ...]  # axial force of the gland on the ring
     peak_contact_stress_Pa: tuple[float, ...]
     contact_width_m: tuple[float, ...]
     area_deformation_gain: float | None  # slope of normal over axial force by least squares; None with one pressure
-    radial_force_N: float | None
-    """value of that line at zero axial force; None with one pressure"""
-    friction_N: tuple[float, ...] | None
-    """sliding friction of one seal, if the case has a law for it"""
+    radial_force_N: float | None  # value of that line at zero axial force; None with one pressure
+    friction_N: tuple[float, ...] | None  # sliding friction of one seal, if the case has a law for it
     shear_stress_Pa: float | None  # of the contact at 1 MPa of contact stress; None without a shear law
     shear_exponent: float | None
     friction_relative_std: float | None

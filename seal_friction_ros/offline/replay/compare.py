@@ -45,8 +45,7 @@ class _Topic(NamedTuple):
 _NO_DIFFERENCE = FieldDifference(0.0, 0.0, 0)
 FRICTION_FIELDS = ('state', 'direction', 'coulomb_friction', 'breakaway_force', 'friction_force')
 """Fields of an estimate that decide by default: not what was learnt, its deviations, and the age of the inputs."""
-COUNTED = ('state', 'direction', 'status', 'limited')
-"""Fields that are no quantities: their differences are counted."""
+COUNTED = ('state', 'direction', 'status', 'limited')  # Fields that are no quantities: their differences are counted.
 
 
 @dataclass(frozen=True)

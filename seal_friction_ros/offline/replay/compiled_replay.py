@@ -64,8 +64,7 @@ class Run:
         self.configuration, self._has_override = configuration, has_override
         self._parameters = configuration.parameters()
         self._tells_sending = state is not None and configuration.tells_sending
-        self.versions: set[int] = set()
-        """of the algorithm that made the recorded configurations used"""
+        self.versions: set[int] = set()  # of the algorithm that made the recorded configurations used
         self.state = init(self._parameters) if state is None else state
 
     def compared(

@@ -82,17 +82,12 @@ class Replay:
         """topics of the bag"""
         self.answers: dict[str, str] = {}
         """topic -> message type of all that the machine makes, in the order in which it makes them"""
-        self.compared: dict[str, str] = {}
-        """those of them that the bag has"""
-        self.has_names = False
-        """whether its actuators have names"""
-        self.estimates = 0
-        """made so far"""
-        self.versions: set[int] = set()
-        """of the algorithm that made the recorded configurations used"""
+        self.compared: dict[str, str] = {}  # those of them that the bag has
+        self.has_names = False  # whether its actuators have names
+        self.estimates = 0  # made so far
+        self.versions: set[int] = set()  # of the algorithm that made the recorded configurations used
         self._override = override
-        self.configuration = self._configuration or rosbag.CONFIGURATION_TOPIC
-        """topic of the configuration in `steps`"""
+        self.configuration = self._configuration or rosbag.CONFIGURATION_TOPIC  # topic of the configuration in `steps`
         self._state_topic = f'{self.configuration.rpartition("/")[0]}/{rosbag.STATE_NAME}'
         self.kept: Collection[str] = {*self.topics, self._state_topic}
         """topics that the bag of a replay keeps, besides the answers"""

@@ -20,8 +20,7 @@ from seal_friction_ros.offline.work.outcome import CRASHED, Outcome, outcome_of
 from seal_friction_ros.offline.work.progress import progress, report_shares_to
 
 Result = TypeVar('Result')
-Workers = int | Cluster
-"""number of processes of this computer, or a cluster"""
+Workers = int | Cluster  # number of processes of this computer, or a cluster
 
 
 def nothing() -> None:

@@ -22,8 +22,7 @@ from seal_friction_ros.offline.work.outcome import CRASHED, Outcome
 from seal_friction_ros.offline.work.places import Place, url_digest
 from seal_friction_ros.offline.work.versions import versions
 
-Values = Mapping[str, Any]
-"""Result of a part: numbers, texts and arrays of at least one element, by name."""
+Values = Mapping[str, Any]  # Result of a part: numbers, texts and arrays of at least one element, by name.
 
 
 class Part(NamedTuple):
@@ -33,8 +32,7 @@ class Part(NamedTuple):
     names: tuple[str, ...]  # of the values in the result
     call: Callable[[], Any]
     """picklable function that computes the part; returns `Values`, or a named tuple with these fields"""
-    output: Path | None = None
-    """folder that the call makes; without it the part is not finished"""
+    output: Path | None = None  # folder that the call makes; without it the part is not finished
 
 
 class Kept(NamedTuple):

@@ -20,8 +20,7 @@ from urllib.parse import unquote, urlsplit
 from seal_friction_ros.offline.work.outcome import error_text
 from seal_friction_ros.packages import MissingPackageError, needed
 
-Place = Path | str
-"""path of a file or folder, or a URL"""
+Place = Path | str  # path of a file or folder, or a URL
 
 _URL = re.compile(r'[A-Za-z][A-Za-z0-9+.:-]*://.+')
 _VERSION = ('etag', 'md5', 'md5hash', 'contentmd5', 'crc32c', 'checksum', 'mtime', 'lastmodified', 'modified')
