@@ -86,6 +86,13 @@ class CheckedParameters:
     def __post_init__(self) -> None:
         check(self)
 
+    def check_order(self, larger: str, smaller: str, *, may_be_equal: bool = False) -> None:
+        """Check that a field is above another one of its unit; ValueError, with both, if it is not."""
+        high, low, unit = getattr(self, larger), getattr(self, smaller), meanings(self)[larger].unit
+        if high < low or (high == low and not may_be_equal):
+            where = 'below' if may_be_equal else 'not above'
+            raise ValueError(f'{type(self).__name__}.{larger} = {high} {unit} is {where} {smaller} = {low} {unit}')
+
 
 def _check_number(where: str, value: Any, meaning: Meaning) -> None:
     if isinstance(value, bool) or not isinstance(value, int | float):

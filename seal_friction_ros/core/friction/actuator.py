@@ -80,10 +80,7 @@ class Seal(CheckedParameters):
             raise ValueError(
                 f'Seal {self.name}: its {self.coulomb_law.NAME} has the velocity in it: leave out velocity_terms'
             )
-        if self.pressure_max <= self.pressure_min:
-            raise ValueError(
-                f'Seal.pressure_max = {self.pressure_max} Pa is not above pressure_min = {self.pressure_min} Pa'
-            )
+        self.check_order('pressure_max', 'pressure_min')
         self._check_monotone()
 
     @property

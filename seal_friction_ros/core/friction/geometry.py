@@ -27,11 +27,7 @@ class SealGeometry(CheckedParameters):
         super().__post_init__()
         if self.sliding_wall not in ('rod', 'bore'):
             raise ValueError(f'SealGeometry.sliding_wall = {self.sliding_wall!r} is neither rod nor bore')
-        if self.gland_diameter <= self.rod_diameter:
-            raise ValueError(
-                f'SealGeometry.gland_diameter = {self.gland_diameter} m is not above '
-                f'rod_diameter = {self.rod_diameter} m'
-            )
+        self.check_order('gland_diameter', 'rod_diameter')
         if not 0.0 < squeeze(self) < 0.5:
             raise ValueError(
                 f'SealGeometry.section_diameter = {self.section_diameter} m gives a squeeze of {squeeze(self):.3f}; '

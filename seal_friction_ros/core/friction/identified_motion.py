@@ -22,8 +22,7 @@ class IdentifiedMotion(CheckedParameters):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.fastest < self.slowest:
-            raise ValueError(f'IdentifiedMotion.fastest = {self.fastest} m/s is below slowest = {self.slowest} m/s')
+        self.check_order('fastest', 'slowest', may_be_equal=True)
         if sorted(self.directions) not in ([-1], [1], [-1, 1]):
             raise ValueError(f'IdentifiedMotion.directions = {list(self.directions)} is not [-1], [1] or [-1, 1]')
 

@@ -65,18 +65,12 @@ def map_pressures(grid: MapGrid) -> FloatArray:
     return np.linspace(0.0, grid.pressure_max, grid.pressures)
 
 
-class _AtRest(NamedTuple):
-    model: LubricationModel
-    start: ContactState
-    stiffness: float  # [N/m] axial
-
-
-def _at_rest(case: LubricationCase, pressure: float) -> _AtRest:
-    """The seal of a case at rest on a plain flooded wall, with ``pressure`` [Pa] on its left."""
+def _at_rest(case: LubricationCase, pressure: float) -> tuple[LubricationModel, ContactState, float]:
+    """The seal of a case at rest on a plain flooded wall, ``pressure`` [Pa] on its left; its axial stiffness [N/m]."""
     if case.oring is not None:
-        return _AtRest(*oring_film(case, case.oring, pressure))
+        return oring_film(case, case.oring, pressure)
     model = profile_model(case, pressure, 0.0)
-    return _AtRest(model, film_at_rest(model), case.groove.stiffness)
+    return model, film_at_rest(model), case.groove.stiffness
 
 
 def _friction(model: LubricationModel, state: ContactState, velocity: float) -> tuple[float, float]:

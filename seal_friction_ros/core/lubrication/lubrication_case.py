@@ -81,10 +81,7 @@ class MapGrid(CheckedParameters):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.velocity_max <= self.velocity_min:
-            raise ValueError(
-                f'MapGrid.velocity_max = {self.velocity_max} m/s is not above velocity_min = {self.velocity_min} m/s'
-            )
+        self.check_order('velocity_max', 'velocity_min')
 
 
 @dataclass(frozen=True, kw_only=True)
