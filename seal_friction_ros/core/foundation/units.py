@@ -79,9 +79,9 @@ def in_si(value: Any, unit: str, where: str, *, is_difference: bool = False) -> 
 def number_and_unit(text: str) -> tuple[float, str] | None:
     """Number and unit of a text such as ``40 mm`` or ``4e-2``, whose unit is empty; None for any other text."""
     matched = _TEXT.fullmatch(text.strip())
-    return (
-        None if matched is None or not (matched[2] or matched[3]) else (float(matched[1]), (matched[3] or '').strip())
-    )
+    if matched is None or not (matched[2] or matched[3]):
+        return None
+    return float(matched[1]), (matched[3] or '').strip()
 
 
 def unit_meant(value: float, unit: str, upper: float) -> str:

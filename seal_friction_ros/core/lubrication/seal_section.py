@@ -52,9 +52,8 @@ def seal_section(seal: SealBody, film_width: float, elements: int) -> SealSectio
     r = bottom + (crown - bottom) * (1.0 - depth / seal.section_height)[:, None]
     nodes = np.stack((r, np.broadcast_to(along, r.shape)), axis=-1).reshape(-1, 2)
     index = np.arange(r.size).reshape(r.shape)
-    model = make_model(
-        Mesh(nodes, quadrilaterals_of(index), outline_of(index)), section_rubber(seal), seal.section_height, 0.0
-    )
+    mesh = Mesh(nodes, quadrilaterals_of(index), outline_of(index))
+    model = make_model(mesh, section_rubber(seal), seal.section_height, 0.0)
     face = index[-1, len(beside) - 1 : len(beside) + elements]
     return SealSection(model, face, under, _held(seal.section_hold, index))
 

@@ -296,9 +296,7 @@ class _OfActuator:
             return self._encoded(message, made)
         if kind == layouts.MACHINE_TYPE:
             answers = decode_together(message.data)
-            return self._encoded(
-                message, [(record, frame_id) for name, record, frame_id in answers if name == self._name]
-            )
+            return self._encoded(message, [one[1:] for one in answers if one.actuator == self._name])
         if kind == layouts.CLOCK_TYPE:
             translation.follow(coder.decode_clock(message.data), message.log_time)
             return [message]

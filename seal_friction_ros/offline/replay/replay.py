@@ -180,11 +180,8 @@ class Replay:
 
     def _ticks_and_clock(self, file: MachineFile) -> dict[str, TopicPlan]:
         numbers = range(len(file.actuators))
-        ticks = {
-            self._topic(f'/{file.actuators[number].name}/watchdog_tick', layouts.TICK_TYPE): number
-            for number in numbers
-        }
-        plans = {topic: record_plan(topic, layouts.TICK_TYPE, (number,)) for topic, number in ticks.items()}
+        ticks = [self._topic(f'/{one.name}/watchdog_tick', layouts.TICK_TYPE) for one in file.actuators]
+        plans = {topic: record_plan(topic, layouts.TICK_TYPE, (number,)) for number, topic in enumerate(ticks)}
         clocks = [topic for topic, info in self.topics.items() if info.type_name == layouts.CLOCK_TYPE]
         return plans | {topic: record_plan(topic, layouts.CLOCK_TYPE, numbers) for topic in clocks}
 
@@ -232,9 +229,8 @@ class Replay:
             for kind, (name, record, frame_id) in zip(kinds, self._made, strict=True):
                 answers.append(Answer(self._topic_of[name, kind], kind, encode(record, frame_id)))
         elif self._made:
-            answers = [
-                Answer(self._topic_of['', layouts.MACHINE_TYPE], layouts.MACHINE_TYPE, encode_together(self._made))
-            ]
+            together = layouts.MACHINE_TYPE
+            answers = [Answer(self._topic_of['', together], together, encode_together(self._made))]
         commands = due_commands(machine, state, layouts.FEEDFORWARD_TYPE in kinds, received)
         return answers + [Answer(command.topic, full_name(command.type_name), command.data) for command in commands]
 
