@@ -135,8 +135,7 @@ def from_compiler(kind: type[Record], record: Any) -> Record:
 
 # -- functions with bound parameters ----------------------------------------------------------------------------------
 
-Bound = partial[float]
-"""A scalar function whose parameters are bound, so that only its two arguments are left."""
+Bound = partial[float]  # A scalar function whose parameters are bound, so that only its two arguments are left.
 
 
 def bound(function: Callable[..., float], record: Any) -> Bound:

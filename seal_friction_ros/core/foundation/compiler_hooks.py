@@ -10,10 +10,8 @@ AloneWith = Callable[[str], AbstractContextManager[None]]
 class CompilerHooks(NamedTuple):
     """Functions that are called around the work of the compiler."""
 
-    before_loading: Callable[[], None]
-    """called before the compiler is loaded"""
-    alone_with: AloneWith
-    """gives the context in which the function of a name is compiled, and written to disk"""
+    before_loading: Callable[[], None]  # called before the compiler is loaded
+    alone_with: AloneWith  # gives the context in which the function of a name is compiled, and written to disk
 
 
 _hooks = [CompilerHooks(lambda: None, lambda _: nullcontext())]

@@ -3,8 +3,7 @@
 import json
 from typing import Any
 
-DEEPEST = 40
-"""Levels of a document: our choice; those of this package have less than 12, and Python ends at some 1000."""
+DEEPEST = 40  # Levels of a document: our choice; those of this package have less than 12, and Python ends at some 1000.
 
 
 class NotJsonError(ValueError):
@@ -14,9 +13,7 @@ class NotJsonError(ValueError):
 def parse_json(text: str | bytes, where: str) -> Any:
     """Document of a text that may come from anybody; ``where`` names it in the error message.
 
-    Raises:
-        NotJsonError: The text is not JSON.
-        ValueError: It is more than `DEEPEST` levels deep.
+    NotJsonError: the text is not JSON; ValueError: it is more than `DEEPEST` levels deep.
     """
     try:
         document = json.loads(text)

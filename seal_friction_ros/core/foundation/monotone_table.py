@@ -18,23 +18,17 @@ def interpolated(
     slope: Column,
     value: Column,
     last: float,
+    slope_beyond: float,
     x: float,
     _unused: float = 0.0,
 ) -> float:
-    """Piecewise cubic at ``x``; the first or last ordinate beyond the ends.
+    """Piecewise cubic at ``x``; before the first knot its ordinate, beyond the last a straight line.
 
-    Args:
-        knots: Abscissae of the points, increasing, shape (n,).
-        cubic: Coefficient of the third power of the distance from each knot, shape (n - 1,); likewise the next three.
-        square: Of the second power.
-        slope: Of the first power.
-        value: Ordinate at each knot.
-        last: Ordinate at the last knot.
-        x: Abscissa.
-        _unused: A bound function takes two arguments.
+    ``cubic``, ``square`` and ``slope`` are the coefficients of the powers of the distance from each of the increasing
+    knots, shape (n - 1,), ``value`` its ordinate. A bound function takes two arguments, so one is not used.
     """
     if x >= knots[-1]:
-        return last
+        return last + slope_beyond * (x - knots[-1])
     x = max(x, knots[0])
     i = bisect_right(knots, x) - 1
     t = x - knots[i]
@@ -44,19 +38,15 @@ def interpolated(
 class MonotoneTable:
     """Monotone piecewise cubic through points [Fritsch1980]_; constant beyond both ends.
 
+    A table that ``rises`` goes on above its last point with the slope that it has there.
+
     ``scipy.interpolate.PchipInterpolator`` gives the coefficients. `interpolated` evaluates one value twenty times
-    faster than SciPy, since the live estimate asks for one value at a time.
-
-    Args:
-        x: Abscissae, strictly increasing, shape (n,), n >= 2.
-        y: Ordinates, shape (n,), finite.
-        name: Name of the table, for error messages.
-
-    Raises:
-        ValueError: The points are too few, not finite or not in increasing order.
+    faster than SciPy, since the live estimate asks for one value at a time. Abscissae x and ordinates y have the shape
+    (n,), n >= 2; ``name`` is for error messages. ValueError: the points are too few, not finite or not in increasing
+    order.
     """
 
-    def __init__(self, x: Sequence[float], y: Sequence[float], name: str) -> None:
+    def __init__(self, x: Sequence[float], y: Sequence[float], name: str, *, rises: bool = False) -> None:
         if len(x) != len(y) or len(x) < 2:
             raise ValueError(f'{name}: needs at least two points with as many ordinates, got {len(x)} and {len(y)}')
         if not (np.isfinite(x).all() and np.isfinite(y).all()):
@@ -75,8 +65,8 @@ class MonotoneTable:
         self.knots: Column = tuple(float(v) for v in spline.x)
         self.cubic, self.square, self.slope, self.value = (tuple(map(float, row)) for row in spline.c)
         self.last = float(y[-1])
-        self.end_slope = float(spline.derivative()(x[-1]))
-        """Slope at the last point, in units of y over x."""
+        self.end_slope = float(spline.derivative()(x[-1]))  # Slope at the last point, in units of y over x.
+        self.slope_beyond = self.end_slope if rises else 0.0
         self.bound = bound(interpolated, self)
 
     def __call__(self, x: float) -> float:

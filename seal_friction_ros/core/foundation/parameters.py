@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar, cast
 
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.foundation.units import in_si, unit_meant
 
 Record = TypeVar('Record')
@@ -64,8 +65,7 @@ class ParameterGroup(NamedTuple):
 def check(record: Any) -> None:
     """Check the described fields of a dataclass instance against their bounds.
 
-    Raises:
-        ValueError: A number is not finite or out of bounds; the message names field, value, unit and bound.
+    ValueError: a number is not finite or out of bounds; the message names field, value, unit and bound.
     """
     for name, meaning in meanings(record).items():
         value = getattr(record, name)
@@ -80,12 +80,18 @@ def check(record: Any) -> None:
 class CheckedParameters:
     """Base of a dataclass of `parameter` fields: `check` runs at construction, so an invalid record never exists.
 
-    Raises:
-        ValueError: A number is not finite or out of bounds.
+    ValueError: a number is not finite or out of bounds.
     """
 
     def __post_init__(self) -> None:
         check(self)
+
+    def check_order(self, larger: str, smaller: str, *, may_be_equal: bool = False) -> None:
+        """Check that a field is above another one of its unit; ValueError, with both, if it is not."""
+        high, low, unit = getattr(self, larger), getattr(self, smaller), meanings(self)[larger].unit
+        if high < low or (high == low and not may_be_equal):
+            where = 'below' if may_be_equal else 'not above'
+            raise ValueError(f'{type(self).__name__}.{larger} = {high} {unit} is {where} {smaller} = {low} {unit}')
 
 
 def _check_number(where: str, value: Any, meaning: Meaning) -> None:
@@ -102,19 +108,12 @@ def _check_number(where: str, value: Any, meaning: Meaning) -> None:
 
 
 def from_mapping(record_type: type[Record], values: Any, where: str, **made: Any) -> Record:
-    """Make a dataclass from untrusted input.
+    """Make a dataclass, whose fields are bool, int, float, str or tuples of str or float, from untrusted input.
 
     Integers convert to floats, lists to tuples, and where a number is declared, texts with a unit to SI. No other type
-    is converted.
-
-    Args:
-        record_type: Dataclass whose fields are bool, int, float, str or tuples of str or float.
-        values: Field name -> value; fields with a default are optional.
-        where: Name of the mapping in error messages.
-        made: Values of further fields; the mapping must not contain these fields.
-
-    Raises:
-        ValueError: A field is unknown, missing, of the wrong type or out of bounds.
+    is converted. Fields with a default are optional. ``made`` has values of further fields, which ``values`` must not
+    contain; ``where`` names the mapping in error messages. ValueError: a field is unknown, missing, of the wrong type
+    or out of bounds.
     """
     if not isinstance(values, Mapping):
         raise ValueError(f'{where} is not a mapping of names to values but {values!r}')
@@ -128,17 +127,14 @@ def from_mapping(record_type: type[Record], values: Any, where: str, **made: Any
         name: _as_declared(value, fields[name].type, f'{where}.{name}', units.get(name, ''))
         for name, value in values.items()
     }
-    try:
+    with named_errors(where):
         return record_type(**made, **converted)
-    except ValueError as error:
-        raise ValueError(f'{where}: {error}') from None
 
 
 def check_names(values: Mapping[Any, Any], known: Collection[str], where: str) -> None:
     """Check that a mapping has ``known`` names only; ``where`` names the mapping in the error message.
 
-    Raises:
-        ValueError: Another name is present; the message lists the known names and the most similar ones.
+    ValueError: another name is present; the message lists the known names and the most similar ones.
     """
     unknown = sorted(printable(name) for name in values if name not in known)
     if unknown:
@@ -172,14 +168,9 @@ def meant(word: str, known: Iterable[str]) -> str:
 
 
 def name_and_source(document: Any, kind: str) -> tuple[str, str]:
-    """``name`` and ``source`` of a document; the source is '' if the document has none.
+    """``name`` and ``source`` of an untrusted document of a ``kind``, for example ``case``; '' if it has no source.
 
-    Args:
-        document: Untrusted input.
-        kind: Kind of file, for example ``case``.
-
-    Raises:
-        ValueError: The document is not a mapping, its name is not one line of text, or its source is not text.
+    ValueError: the document is not a mapping, its name is not one line of text, or its source is not text.
     """
     if not isinstance(document, Mapping):
         raise ValueError(f'a {kind} file is a mapping of names to values, not {type(document).__name__}')

@@ -18,10 +18,8 @@ class StampRepair:
     """
 
     def __init__(self) -> None:
-        self.jumps = 0
-        """Number of jumps."""
-        self.repaired = 0
-        """Number of stamps that were changed."""
+        self.jumps = 0  # Number of jumps.
+        self.repaired = 0  # Number of stamps that were changed.
         self._stamp = self._received = self._shift = 0
         self._is_begun = False
 

@@ -37,16 +37,14 @@ QUANTITIES: dict[str, tuple[str, ...]] = {quantity: tuple(sizes) for quantity, s
 """Quantity -> its units, that of SI first."""
 QUANTITY_OF: dict[str, str] = {unit: quantity for quantity, units in QUANTITIES.items() for unit in units}
 """Name of a unit -> its quantity."""
-ZEROS = {'K': 0.0, 'degC': 273.15}
-"""Unit of temperature -> its zero [K]."""
+ZEROS = {'K': 0.0, 'degC': 273.15}  # Unit of temperature -> its zero [K].
 _TEXT = re.compile(r'([-+]?(?:\d+(?:\.\d*)?|\.\d+)(e[-+]?\d+)?) *([a-z][\w/^ ()*]*)?', re.IGNORECASE)
 
 
 def unit_size(name: str) -> float:
     """Size in SI of the unit called ``name``, for example 6894.757 [Pa] for ``psi``.
 
-    Raises:
-        ValueError: There is no such unit.
+    ValueError: there is no such unit.
     """
     try:
         return UNITS[name]
@@ -57,14 +55,9 @@ def unit_size(name: str) -> float:
 def in_si(value: Any, unit: str, where: str, *, is_difference: bool = False) -> float:
     """Number in SI of an untrusted value: ``0.04``, ``40 mm``, or ``4e-2``, which YAML 1.1 reads as a text.
 
-    Args:
-        value: The value.
-        unit: Unit of SI that a number without unit is in; the unit of a text has to be of the same quantity.
-        where: Name of the value in error messages.
-        is_difference: Whether a temperature is one between two, so that degC and K are the same.
-
-    Raises:
-        ValueError: It is no number, is too large for one, or has a unit of another quantity.
+    A number without unit is in ``unit`` of SI; the unit of a text has to be of the same quantity. ``where`` names the
+    value in error messages. Of a difference of temperatures degC and K are the same. ValueError: it is no number, is
+    too large for one, or has a unit of another quantity.
     """
     others = QUANTITIES[QUANTITY_OF[unit]] if unit in QUANTITY_OF else (unit,)
     if isinstance(value, str) and (found := number_and_unit(value)) is not None:
@@ -86,9 +79,9 @@ def in_si(value: Any, unit: str, where: str, *, is_difference: bool = False) -> 
 def number_and_unit(text: str) -> tuple[float, str] | None:
     """Number and unit of a text such as ``40 mm`` or ``4e-2``, whose unit is empty; None for any other text."""
     matched = _TEXT.fullmatch(text.strip())
-    return (
-        None if matched is None or not (matched[2] or matched[3]) else (float(matched[1]), (matched[3] or '').strip())
-    )
+    if matched is None or not (matched[2] or matched[3]):
+        return None
+    return float(matched[1]), (matched[3] or '').strip()
 
 
 def unit_meant(value: float, unit: str, upper: float) -> str:

@@ -18,10 +18,10 @@ import numpy as np
 from scipy.special import ndtri
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.foundation.parameters import check_names, printable
 
-KINDS = {'relative_std': 1, 'factor': 1, 'tolerance': 1, 'range': 2}
-"""Numbers that each kind of spread has."""
+KINDS = {'relative_std': 1, 'factor': 1, 'tolerance': 1, 'range': 2}  # Numbers that each kind of spread has.
 _MOST = {'relative_std': 10.0, 'factor': 1000.0}
 _LARGEST = 1e15  # of any amount
 _ENDS = np.array([0.005, 0.995])  # shares at which a case has to be possible (our choice)
@@ -38,10 +38,7 @@ class Unknown:
         \text{range: } & x = a + (b - a) u
 
     So a ``relative_std`` is log-normal with the median x_0, the others are uniform, a ``factor`` in the logarithm (our
-    choice).
-
-    Raises:
-        ValueError: The kind has other numbers, or x_0 is not positive where the spread is relative to it.
+    choice). ValueError: the kind has other numbers, or x_0 is not positive where the spread is relative to it.
     """
 
     name: str  # dotted, for example ``rubber.hardness``
@@ -84,34 +81,24 @@ class Unknown:
 def parse_unknowns(
     values: Any, known: Mapping[str, float], vary: Callable[[Mapping[str, float]], Any], where: str
 ) -> tuple[Unknown, ...]:
-    """Unknowns of a case file.
+    """Unknowns of a case file from its untrusted mapping of names to spreads; ``where`` names it in error messages.
 
-    Args:
-        values: Mapping of name to spread, untrusted.
-        known: Value in the case of each number that may be unknown.
-        vary: Makes the case with other values, by name; raises ValueError if there is no such case.
-        where: Name of the mapping in error messages.
-
-    Raises:
-        ValueError: A name or a spread is invalid, or there is no case at one of its `Unknown.ends`; one line.
+    ``known`` has the value in the case of each number that may be unknown. ``vary`` makes the case with other values;
+    ValueError if there is no such case. ValueError: a name or a spread is invalid, or there is no case at one of its
+    `Unknown.ends`; one line.
     """
     if not isinstance(values, Mapping) or not values:
         raise ValueError(f'{where} is not a mapping of names to spreads but {values!r}')
     check_names(values, known, where)
-    try:
+    with named_errors(where):
         unknowns = tuple(Unknown(name, known[name], *_spread(name, spread)) for name, spread in values.items())
-    except ValueError as error:
-        raise ValueError(f'{where}: {error}') from None
     for name, end in ((unknown.name, end) for unknown in unknowns for end in unknown.ends):
-        try:
+        with named_errors(f'{where}: {name} = {end:.6g}'):
             vary({name: end})
-        except ValueError as error:
-            raise ValueError(f'{where}: {name} = {end:.6g}: {error}') from None
     return unknowns
 
 
 def _spread(name: str, spread: Any) -> tuple[str, tuple[float, ...]]:
-    """Kind and amounts of a spread."""
     if not isinstance(spread, Mapping) or len(spread) != 1 or next(iter(spread)) not in KINDS:
         raise ValueError(f'{name} = {printable(spread)} is none of {", ".join(f"{{{kind}: ...}}" for kind in KINDS)}')
     ((kind, given),) = spread.items()

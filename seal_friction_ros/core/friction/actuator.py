@@ -45,11 +45,8 @@ class Uncertainty(CheckedParameters):
 class Seal(CheckedParameters):
     """One seal: its friction law, its breakaway force, its uncertainty, and the range in which it was identified.
 
-    Breakaway force is (1 + ``stiction_ratio``) f_c + ``stiction``.
-
-    Raises:
-        ValueError: A value is out of bounds, friction falls with pressure inside the identified range, or the law and
-            the velocity terms both depend on the speed.
+    Breakaway force is (1 + ``stiction_ratio``) f_c + ``stiction``. ValueError: a value is out of bounds, friction falls
+    with pressure inside the identified range, or the law and the velocity terms both depend on the speed.
     """
 
     name: str
@@ -83,10 +80,7 @@ class Seal(CheckedParameters):
             raise ValueError(
                 f'Seal {self.name}: its {self.coulomb_law.NAME} has the velocity in it: leave out velocity_terms'
             )
-        if self.pressure_max <= self.pressure_min:
-            raise ValueError(
-                f'Seal.pressure_max = {self.pressure_max} Pa is not above pressure_min = {self.pressure_min} Pa'
-            )
+        self.check_order('pressure_max', 'pressure_min')
         self._check_monotone()
 
     @property
@@ -146,11 +140,7 @@ NO_SEALS = (numbers_of_law(ConstantCoulomb(0.0)),)
 
 @dataclass(frozen=True)
 class MountedSeal:
-    """A seal and the chamber whose pressure it sees, one of `CHAMBERS`.
-
-    Raises:
-        ValueError: The chamber is not one of them.
-    """
+    """A seal and the chamber whose pressure it sees, one of `CHAMBERS`; ValueError: the chamber is not one of them."""
 
     seal: Seal
     chamber: str
@@ -193,14 +183,9 @@ class ActuatorFriction(NamedTuple):
 def sliding_friction(
     seal: SealNumbers, coulomb_friction: float, pressure: float, speed: float, direction: int
 ) -> float:
-    """Magnitude of the friction of one sliding seal [N], its scale left out.
+    """Magnitude of the friction of one sliding seal [N], its scale left out, from that of its law at ``pressure`` [N].
 
-    Args:
-        seal: The seal.
-        coulomb_friction: By its law at ``pressure`` [N].
-        pressure: [Pa, gauge, >= 0].
-        speed: [m/s, >= 0].
-        direction: 1 on extension, -1 on retraction.
+    Pressure in [Pa, gauge, >= 0], speed in [m/s, >= 0]; the direction is 1 on extension, -1 on retraction.
     """
     if seal.law_depends_on_speed:
         return evaluate(seal.law, pressure, speed)
@@ -249,19 +234,13 @@ def friction_of_seal(
 def friction_of_seals(
     seals: tuple[SealNumbers, ...], pressure_a: float, pressure_b: float, velocity: float
 ) -> ActuatorFriction:
-    """Sum over the seals of an actuator.
+    """Sum over the seals of an actuator at both pressures [Pa, gauge] and a velocity [m/s], positive on extension.
 
-    Standard deviations add up linearly, since the seals of an actuator are of one kind, age and temperature and are
-    wrong together (our choice; independent seals would be surer than this). A seal is inside its identified range up
-    to 1 % of the range beyond its ends, so that sensor noise at zero pressure does not count as extrapolation (our
-    choice). A chamber below ambient pressure presses the seal no less than no pressure does, so a negative gauge
-    pressure counts as zero (our choice).
-
-    Args:
-        seals: The seals.
-        pressure_a: Pressure of chamber a [Pa, gauge].
-        pressure_b: Pressure of chamber b [Pa, gauge].
-        velocity: Rod velocity [m/s], positive on extension. The standard deviation is that of a reading at it.
+    Standard deviations, of a reading at that velocity, add up linearly, since the seals of an actuator are of one kind,
+    age and temperature and are wrong together (our choice; independent seals would be surer than this). A seal is
+    inside its identified range up to 1 % of the range beyond its ends, so that sensor noise at zero pressure does not
+    count as extrapolation (our choice). A chamber below ambient pressure presses the seal no less than no pressure
+    does, so a negative gauge pressure counts as zero (our choice).
     """
     coulomb = 0.0
     std = 0.0
@@ -313,15 +292,10 @@ def sliding_friction_of_seals(
 
 @compilable
 def at_temperature(friction: ActuatorFriction, law: TemperatureScale, temperature: float) -> ActuatorFriction:
-    r"""Friction at ``temperature`` [K] from that at the reference.
+    r"""Friction at a finite ``temperature`` [K] from that at the reference.
 
-    Every force has the scale. The error of k is added to the standard deviation:
-    :math:`\sigma^2 = (s \sigma_0)^2 + (s f \sigma_k (T - T_0))^2`.
-
-    Args:
-        friction: By the seal files, at the reference temperature.
-        law: Of the seals.
-        temperature: [K] finite.
+    Every force has the scale. The error of k is added to the standard deviation: :math:`\sigma^2 = (s \sigma_0)^2 + (s
+    f \sigma_k (T - T_0))^2`.
     """
     coulomb, std, stiction, in_identified_range, velocity_friction, asymmetry = friction
     scale = scale_at(law, temperature)

@@ -37,15 +37,9 @@ NO_CORRECTION = ForceSumCorrection()
 
 @compilable
 def corrected_force_sum(correction: ForceSumCorrection, force_sum: Any, pressure_a: Any, pressure_b: Any) -> Any:
-    r"""True force sum from the measured one [N].
+    r"""True force sum from the measured one [N] and both pressures [Pa, gauge], numbers or arrays.
 
     .. math:: \Sigma F = \Sigma F_{measured} + A_a p_a + A_b p_b + F_0
-
-    Args:
-        correction: Of this machine.
-        force_sum: As measured [N], a number or an array, as the pressures.
-        pressure_a: Pressure of chamber a [Pa, gauge].
-        pressure_b: Pressure of chamber b [Pa, gauge].
 
     Source: the force sum is linear in the pressures, so an area or a zero that is wrong gives this. One correction that
     does not change with time is our choice. A load that the force sum contains stays in it.
@@ -62,8 +56,7 @@ def measured_force_sum(correction: ForceSumCorrection, force_sum: float, pressur
 def one_correction(corrections: Iterable[ForceSumCorrection | None]) -> ForceSumCorrection | None:
     """The correction of a machine from those of all its seals, which applies once; None if no seal has one.
 
-    Raises:
-        ValueError: Two differ.
+    ValueError: two differ.
     """
     different = list(dict.fromkeys(correction for correction in corrections if correction is not None))
     if len(different) > 1:

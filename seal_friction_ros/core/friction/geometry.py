@@ -10,10 +10,8 @@ from seal_friction_ros.core.foundation.parameters import CheckedParameters, para
 class SealGeometry(CheckedParameters):
     """An O-ring and the ring-shaped space it is squeezed into.
 
-    The space lies between an inner wall (rod, or groove of a piston) and an outer wall (gland, or bore).
-
-    Raises:
-        ValueError: A dimension is out of bounds, the walls do not fit, or the ring is not squeezed.
+    The space lies between an inner wall (rod, or groove of a piston) and an outer wall (gland, or bore). ValueError: a
+    dimension is out of bounds, the walls do not fit, or the ring is not squeezed.
     """
 
     section_diameter: float = parameter(unit='m', lower=1e-4, upper=0.1, description='Diameter of the ring section, d.')
@@ -29,11 +27,7 @@ class SealGeometry(CheckedParameters):
         super().__post_init__()
         if self.sliding_wall not in ('rod', 'bore'):
             raise ValueError(f'SealGeometry.sliding_wall = {self.sliding_wall!r} is neither rod nor bore')
-        if self.gland_diameter <= self.rod_diameter:
-            raise ValueError(
-                f'SealGeometry.gland_diameter = {self.gland_diameter} m is not above '
-                f'rod_diameter = {self.rod_diameter} m'
-            )
+        self.check_order('gland_diameter', 'rod_diameter')
         if not 0.0 < squeeze(self) < 0.5:
             raise ValueError(
                 f'SealGeometry.section_diameter = {self.section_diameter} m gives a squeeze of {squeeze(self):.3f}; '

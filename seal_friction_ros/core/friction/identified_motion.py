@@ -13,8 +13,7 @@ SPEED_MARGIN = 0.1  # [-] our choice: up to this share beyond its ends a speed c
 class IdentifiedMotion(CheckedParameters):
     """Motions in which one seal was measured; the default is any.
 
-    Raises:
-        ValueError: A speed is out of bounds, the highest is below the lowest, or a direction is neither -1 nor 1.
+    ValueError: a speed is out of bounds, the highest is below the lowest, or a direction is neither -1 nor 1.
     """
 
     slowest: float = parameter(0.0, unit='m/s', lower=0.0, upper=1e3, description='Lowest speed identified.')
@@ -23,8 +22,7 @@ class IdentifiedMotion(CheckedParameters):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.fastest < self.slowest:
-            raise ValueError(f'IdentifiedMotion.fastest = {self.fastest} m/s is below slowest = {self.slowest} m/s')
+        self.check_order('fastest', 'slowest', may_be_equal=True)
         if sorted(self.directions) not in ([-1], [1], [-1, 1]):
             raise ValueError(f'IdentifiedMotion.directions = {list(self.directions)} is not [-1], [1] or [-1, 1]')
 

@@ -21,8 +21,7 @@ _A, _B, _DIFFERENCE = (CHAMBERS.index(name) for name in ('a', 'b', 'difference')
 class Mounting(CheckedParameters):
     """How a seal file says that its seals are mounted.
 
-    Raises:
-        ValueError: There is no chamber, or one that is not in `CHAMBERS`.
+    ValueError: there is no chamber, or one that is not in `CHAMBERS`.
     """
 
     chambers: tuple[str, ...] = parameter(
@@ -39,8 +38,7 @@ class Mounting(CheckedParameters):
 def check_chambers(where: str, chambers: Sequence[str]) -> None:
     """Check that every chamber is one of `CHAMBERS`; ``where`` names them in the error message.
 
-    Raises:
-        ValueError: One is not; the message names it.
+    ValueError: one is not; the message names it.
     """
     wrong = [chamber for chamber in chambers if chamber not in CHAMBERS]
     if wrong:
@@ -49,14 +47,9 @@ def check_chambers(where: str, chambers: Sequence[str]) -> None:
 
 @compilable
 def pressure_at_seal(chamber: int, pressure_a: Any, pressure_b: Any) -> Any:
-    """Pressure that a seal sees [Pa, gauge].
+    """Pressure that a seal sees, its chamber an index in `CHAMBERS`; pressures in [Pa, gauge], numbers or arrays.
 
     A piston seal sees |p_a - p_b|: it seals both ways alike (our choice).
-
-    Args:
-        chamber: Index in `CHAMBERS`.
-        pressure_a: Pressure of chamber a [Pa, gauge], a number or an array.
-        pressure_b: Pressure of chamber b, likewise.
     """
     if chamber == _A:
         return pressure_a
@@ -84,12 +77,6 @@ def pressed_out(chamber: int, pressure_a: float, pressure_b: float) -> float:
 
 
 def pressures_at_seals(chambers: Sequence[str], pressure_a: FloatArray, pressure_b: FloatArray) -> FloatArray:
-    """Pressure that each seal sees [Pa, gauge], shape (n, number of seals).
-
-    Args:
-        chambers: Of each seal, as in `CHAMBERS`.
-        pressure_a: Pressure of chamber a [Pa, gauge], shape (n,).
-        pressure_b: Pressure of chamber b, likewise.
-    """
+    """Pressure that each seal sees [Pa, gauge], shape (n, number of seals), from those of both chambers, shape (n,)."""
     seen = (pressure_at_seal(CHAMBERS.index(chamber), pressure_a, pressure_b) for chamber in chambers)
     return np.column_stack([np.broadcast_to(pressure, pressure_a.shape) for pressure in seen])

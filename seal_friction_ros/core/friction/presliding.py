@@ -36,8 +36,7 @@ from seal_friction_ros.core.foundation.parameters import CheckedParameters, para
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.states import BREAKAWAY, SLIDING, STUCK, StateFriction, sign, state_friction
 
-SLOTS = 6
-"""Largest number of elements: records of fixed size compile, and go into a snapshot."""
+SLOTS = 6  # Largest number of elements: records of fixed size compile, and go into a snapshot.
 
 
 class Elements(NamedTuple):
@@ -205,13 +204,7 @@ def gross_sliding(numbers: PreslidingNumbers, forces: Elements, displacement: fl
 
 @compilable
 def shear(numbers: PreslidingNumbers, state: Shear, slide: Slide) -> tuple[Shear, float]:
-    """Friction force [N] after a displacement of the rod; the equations at the top.
-
-    Args:
-        numbers: Elasticity.
-        state: `NOT_SHEARED`, or from the displacement before.
-        slide: The displacement, on which the rod does not reverse.
-    """
+    """Friction force [N] after a displacement on which the rod does not reverse; the equations at the top."""
     displacement, elapsed, coulomb, sliding_excess, stiction = slide
     forces, excess = state
     before = coulomb + excess
@@ -238,16 +231,8 @@ def acting_friction(
 ) -> StateFriction:
     """Friction that acts on the rod and its state, after `shear` made ``state`` and ``force`` [N] of ``slide``.
 
-    Sliding or breakaway where every element yields, stuck below. Rigid seals have the six states of `state_friction`.
-
-    Args:
-        numbers: Elasticity.
-        state: After the displacement.
-        force: Friction force after the displacement [N].
-        slide: The displacement.
-        at_rest: Whether the velocity counts as zero.
-        velocity: Rod velocity [m/s].
-        force_sum: Sum of the axial forces except seal friction [N].
+    Sliding or breakaway where every element yields, stuck below. Rigid seals have the six states of `state_friction`,
+    with its arguments.
     """
     if math.isinf(numbers.stiffness):
         coulomb = slide.coulomb_friction
@@ -304,16 +289,9 @@ def lugre(
 
     .. math:: \dot z = v - \frac{\sigma_0 |v|}{g} z, \qquad F_f = \sigma_0 z + \sigma_1 \dot z
 
-    integrated exactly at a constant g over the displacement. A rung for comparison and a plant that is not the model of
-    the feed-forward: it drifts under a load that vibrates below breakaway [Dupont2002]_, and its minor loops are not
-    closed.
-
-    Args:
-        numbers: Parameters.
-        deflection: Before the displacement [m].
-        displacement: [m].
-        velocity: At its end [m/s].
-        friction: g, sliding friction at this speed [N].
+    integrated exactly at a constant g, the sliding ``friction`` [N] at this speed, over the displacement [m], at whose
+    end the rod has ``velocity`` [m/s]. A rung for comparison and a plant that is not the model of the feed-forward: it
+    drifts under a load that vibrates below breakaway [Dupont2002]_, and its minor loops are not closed.
 
     Source: [CanudasDeWit1995]_; viscous friction is part of g here.
     """

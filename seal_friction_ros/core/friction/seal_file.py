@@ -78,8 +78,7 @@ def friction_laws() -> dict[str, type[FrictionLaw]]:
 def parse_seal(document: Any) -> Seal:
     """Make a seal from the document of a seal file.
 
-    Raises:
-        ValueError: The document is not valid; the message names the seal, the field, its value and its bound.
+    ValueError: the document is not valid; the message names the seal, the field, its value and its bound.
     """
     name, _ = name_and_source(document, 'seal')
     where = f'seal {name}'
@@ -124,8 +123,7 @@ def _ends(document: Mapping[str, Any], key: str, what: str, where: str) -> Any:
 def mounting_of(document: Any) -> Mounting | None:
     """How the seals of a seal file are mounted; None if its document does not tell.
 
-    Raises:
-        ValueError: The mounting is not valid; the message names the seal and the chamber.
+    ValueError: the mounting is not valid; the message names the seal and the chamber.
     """
     if not isinstance(document, Mapping) or 'mounting' not in document:
         return None
@@ -146,8 +144,7 @@ def law_document(law: FrictionLaw) -> dict[str, Any]:
 def mount_seals(documents: tuple[Any, ...], chambers: tuple[str, ...]) -> tuple[MountedSeal, ...]:
     """Seals of an actuator from their documents and the chamber of each, one of `CHAMBERS`.
 
-    Raises:
-        ValueError: There are not as many chambers as seals, or a document or chamber is not valid.
+    ValueError: there are not as many chambers as seals, or a document or chamber is not valid.
     """
     if len(documents) != len(chambers):
         raise ValueError(
@@ -177,15 +174,10 @@ def _friction_law(law_type: type[FrictionLaw], document: Mapping[str, Any], wher
 
 
 def parse_part(part_type: Any, document: Mapping[str, Any], where: str) -> Any:
-    """Geometry, or the law that ``law`` names, from its key of a document.
+    """Geometry, or the law that ``law`` names, from its key of a document, which ``where`` names in error messages.
 
-    Args:
-        part_type: `SealGeometry`, `NormalForceLaw` or `FrictionCoefficientLaw`.
-        document: Document of a seal file.
-        where: Name of the document in error messages.
-
-    Raises:
-        ValueError: The part is missing or not valid.
+    ``part_type`` is `SealGeometry`, `NormalForceLaw` or `FrictionCoefficientLaw`. ValueError: the part is missing or
+    not valid.
     """
     key = _PARTS[part_type]
     part, where = document.get(key), f'{where}: {key}'

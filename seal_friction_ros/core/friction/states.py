@@ -36,14 +36,8 @@ def sign(x: float) -> int:
 def is_at_rest(velocity: float, was_at_rest: bool, stick_velocity: float, slip_velocity: float) -> bool:
     """Whether a measured velocity counts as V = 0, with hysteresis.
 
-    A rod comes to rest at ``|V| <= stick_velocity`` and leaves rest at ``|V| > slip_velocity``. With both zero this is
-    the thesis's ``V = 0`` exactly.
-
-    Args:
-        velocity: Rod velocity [m/s].
-        was_at_rest: Answer for the sample before.
-        stick_velocity: Upper end of rest for a rod that slid [m/s].
-        slip_velocity: Upper end of rest for a rod at rest [m/s], at least ``stick_velocity``.
+    A rod comes to rest at ``|V| <= stick_velocity`` and leaves rest at ``|V| > slip_velocity``, which is not below it,
+    both in [m/s]. With both zero this is the thesis's ``V = 0`` exactly.
 
     Source: thesis, chapter 7, for V = 0; the band with hysteresis, as in [Karnopp1985]_, is our choice.
     """
@@ -61,12 +55,8 @@ def state_friction(
         f_b\,\mathrm{sgn}(\Sigma F) & \text{at rest, } |\Sigma F| \ge f_b \text{: breakaway} \\
         \Sigma F & \text{at rest, } |\Sigma F| < f_b \text{: stuck} \end{cases}
 
-    Args:
-        velocity: Rod velocity [m/s].
-        force_sum: Sum of the axial forces except seal friction [N].
-        at_rest: Whether the velocity counts as zero, see `is_at_rest`.
-        coulomb_friction: f_c [N].
-        breakaway_force: f_b [N]; f_c gives the thesis's equation, f_c + stiction its measured static friction.
+    with the rod velocity V [m/s], at rest by `is_at_rest`, the sum of the axial forces except seal friction, and both
+    frictions [N]. f_b = f_c gives the thesis's equation, f_b = f_c + stiction its measured static friction.
 
     Source: thesis, chapter 7 and Figure 21; f_b above f_c from the static readings of Tables A-1 to A-3.
     """

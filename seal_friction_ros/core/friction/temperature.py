@@ -24,8 +24,7 @@ COLDEST, HOTTEST = 150.0, 600.0  # [K] no rubber seal works beyond
 class TemperatureScale(CheckedParameters):
     """The part ``temperature`` of a seal file.
 
-    Raises:
-        ValueError: A value is out of bounds, or the reference is not within the identified temperatures.
+    ValueError: a value is out of bounds, or the reference is not within the identified temperatures.
     """
 
     reference: float = parameter(
@@ -73,8 +72,7 @@ def is_identified_at(law: TemperatureScale, temperature: float) -> bool:
 def one_temperature_scale(scales: Iterable[TemperatureScale | None]) -> TemperatureScale | None:
     """The scale of an actuator from those of its seals; None if no seal has one.
 
-    Raises:
-        ValueError: Two seals differ, or only some have one: one temperature scales the friction of all.
+    ValueError: two seals differ, or only some have one: one temperature scales the friction of all.
     """
     different = list(dict.fromkeys(scales))
     if len(different) > 1:

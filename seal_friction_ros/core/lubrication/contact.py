@@ -24,7 +24,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.compiled import compiled
-from seal_friction_ros.core.foundation.errors import NotConvergedError
+from seal_friction_ros.core.foundation.errors import NotConvergedError, named_errors
 from seal_friction_ros.core.lubrication.elasticity import ElasticBody
 from seal_friction_ros.core.lubrication.flow_factors import (
     flow_factor_coefficients,
@@ -45,8 +45,7 @@ _ROUNDING = 2e-15  # relative
 _LEAST_FLOW = 1e-25  # [m^2/s] lower limit of the reference flow: a dry contact has none
 _COMPLEMENTARITY_TOLERANCE = 1e-13
 _PRESSURE_SCALE = 1e5  # [Pa] p_s of the complementarity
-THINNEST = 1e-9
-"""[m] a gap below this flows like this"""
+THINNEST = 1e-9  # [m] a gap below this flows like this
 
 
 Solver = Callable[[Callable[[FloatArray], FloatArray], FloatArray, float, int], FloatArray]
@@ -62,8 +61,7 @@ def scipy_gmres(
 ) -> FloatArray:
     """`Solver` of SciPy, without restart.
 
-    Raises:
-        StalledError: The residual is larger after ``iterations``, or not a number.
+    StalledError: the residual is larger after ``iterations``, or not a number.
     """
     operator = LinearOperator((len(right), len(right)), product, dtype=np.float64)
     found, failed = gmres(operator, right, rtol=0.0, atol=tolerance, restart=iterations, maxiter=1)
@@ -241,11 +239,7 @@ def _newton_change(
     elastic: FloatArray,
     compliance_factor: float,
 ) -> tuple[FloatArray, FloatArray]:
-    """Changes of gap and of the unknown left in each cell.
-
-    Raises:
-        NotConvergedError: GMRES did not converge.
-    """
+    """Changes of gap and of the unknown left in each cell; NotConvergedError: GMRES did not converge."""
     stiffness = contact.body.stiffness_band / compliance_factor
     kernel = np.concatenate((stiffness[:0:-1], stiffness))  # of the product with the banded stiffness
     band = _factored_band(rows, kept, slope, stiffness)
@@ -268,10 +262,8 @@ def _newton_change(
         by_gap, _, by_total = solved(y, none)
         return deflected(by_gap, by_total)
 
-    try:
+    with named_errors('contact step', StalledError, NotConvergedError):
         y = contact.solve(product, wanted, tolerance, _GMRES_ITERATIONS)
-    except StalledError as error:
-        raise NotConvergedError(f'contact step: {error}') from None
     more_gap, more_left, _ = solved(y, none)
     return gap + more_gap, left + more_left
 
@@ -286,20 +278,13 @@ def contact_step(
     time_step: float,
     compliance_factor: float = 1.0,
 ) -> ContactStep:
-    """Film and gap after one implicit Euler step; infinite ``time_step`` for the steady film.
+    """Film and gap after one implicit Euler step; infinite ``time_step`` [s] for the steady film.
 
-    Args:
-        contact: The contact.
-        guess: Start of Newton's method: the state before the step, or an extrapolation.
-        rigid_gap: Gap at the end of the step without the deflection by film and asperities [m], shape (n,).
-        wall_velocity: Velocity of the wall in the frame of the seal during the step [m/s].
-        ends: Conditions at both ends of the film.
-        old_thickness: theta h before the step [m], shape (n,).
-        time_step: [s]
-        compliance_factor: Factor of the compliance of the half-plane (viscoelastic seal).
-
-    Raises:
-        NotConvergedError: Newton's method or GMRES did not converge, or the surfaces would overlap.
+    ``guess`` is the start of Newton's method: the state before the step, or an extrapolation. ``rigid_gap`` [m] is that
+    at the end of the step without the deflection by film and asperities, ``old_thickness`` [m] theta h before the step,
+    shape (n,) each; the wall has its velocity [m/s] in the frame of the seal. ``compliance_factor`` scales the
+    compliance of the half-plane (viscoelastic seal). NotConvergedError: Newton's method or GMRES did not converge, or
+    the surfaces would overlap.
     """
     plane, rough, numbers = contact.body, contact.rough, contact.grease.numbers
     rate = 1.0 / time_step
@@ -341,8 +326,7 @@ def contact_step(
 def dry_contact(contact: LubricatedContact, rigid_gap: FloatArray, guess: FloatArray | None = None) -> FloatArray:
     """Gap of the dry rough contact [m], shape (n,): h = g + K p_c(h); Newton's method begins at ``guess``, or at g.
 
-    Raises:
-        NotConvergedError: Newton's method did not converge.
+    NotConvergedError: Newton's method did not converge.
     """
     plane = contact.body
     matrix = plane.matrix()

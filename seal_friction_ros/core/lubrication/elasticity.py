@@ -1,8 +1,8 @@
 """Deflection of the seal surface under pressure: a half-plane, or finite elements."""
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -14,34 +14,31 @@ from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 _HALF_BAND = 6  # of the approximate inverse; 4 to 10 run alike
 
 
-class ElasticBody(Protocol):
+@dataclass(frozen=True, eq=False)
+class ElasticBody(ABC):
     """What the contact needs of the body under the film, on cells of one width."""
 
-    @property
-    def cells(self) -> int:
-        """Number of cells."""
+    cells: int
+    cell_width: float  # [m]
+    modulus: float  # plane-strain modulus E* = E / (1 - nu^2) [Pa], of the asperities, too
+    stiffness_band: FloatArray = field(init=False, repr=False)
+    """banded approximate inverse of the matrix: stiffness against a cell r away [Pa/m], shape (7,)"""
 
-    @property
-    def cell_width(self) -> float:
-        """Width of a cell [m]."""
+    def __post_init__(self) -> None:
+        object.__setattr__(self, 'stiffness_band', _stiffness_band(self.cells, self.cell_width, self.modulus))
 
-    @property
-    def modulus(self) -> float:
-        """Plane-strain modulus E* [Pa], of the asperities, too."""
-
-    @property
-    def stiffness_band(self) -> FloatArray:
-        """Banded approximate inverse of the matrix: stiffness against a cell r away [Pa/m], shape (7,)."""
-
-    def deflection(self, pressure: FloatArray) -> FloatArray:
-        """Deflection [m] of each cell under ``pressure`` [Pa], shape (cells,)."""
-
+    @abstractmethod
     def matrix(self) -> FloatArray:
         """Full influence matrix [m/Pa], shape (cells, cells)."""
 
+    def deflection(self, pressure: FloatArray) -> FloatArray:
+        """Deflection [m] of each cell under ``pressure`` [Pa], shape (cells,)."""
+        deflected: FloatArray = self.matrix() @ pressure
+        return deflected
+
 
 @dataclass(frozen=True, eq=False)
-class HalfPlane:
+class HalfPlane(ElasticBody):
     r"""Influence matrix of a half-plane on a uniform grid of cells, each with one pressure, rigid at a depth.
 
     .. math:: u(x) = \frac{2}{\pi E^*} \int p(s) \ln\frac{d}{|x - s|}\,ds
@@ -52,20 +49,16 @@ class HalfPlane:
     Source: K. L. Johnson, Contact Mechanics, 1985, section 2.3 and appendix.
     """
 
-    cells: int
-    cell_width: float  # [m]
-    modulus: float  # plane-strain modulus E* = E / (1 - nu^2) [Pa]
     depth: float  # [m]
     influence: FloatArray = field(init=False, repr=False)
     """deflection of a cell by a unit pressure r cells away [m/Pa], shape (cells,)"""
-    stiffness_band: FloatArray = field(init=False, repr=False)
-    """banded approximate inverse of the influence matrix: stiffness against a cell r away [Pa/m], shape (7,)"""
     _length: int = field(init=False, repr=False)
     _spectrum: npt.NDArray[np.complex128] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.cells < 16:
             raise ValueError(f'HalfPlane.cells = {self.cells} is too few: take 16 at least')
+        super().__post_init__()
         influence = self._influence()
         length = next_fast_len(2 * self.cells, real=True)
         ring = np.zeros(length)  # first column of a circulant that holds the Toeplitz matrix
@@ -74,7 +67,6 @@ class HalfPlane:
         object.__setattr__(self, '_length', length)
         object.__setattr__(self, 'influence', influence)
         object.__setattr__(self, '_spectrum', np.fft.rfft(ring))
-        object.__setattr__(self, 'stiffness_band', _stiffness_band(self.cells, self.cell_width, self.modulus))
 
     def _influence(self) -> FloatArray:
         if self.depth < self.cells * self.cell_width:
@@ -94,22 +86,10 @@ class HalfPlane:
 
 
 @dataclass(frozen=True, eq=False)
-class CondensedBody:
-    r"""Finite-element body on the cells of a film; `condensed_body` makes it."""
+class CondensedBody(ElasticBody):
+    """Finite-element body on the cells of a film; `condensed_body` makes it."""
 
-    cells: int
-    cell_width: float  # [m]
-    modulus: float  # plane-strain modulus E* of the surface [Pa]
     compliance: FloatArray  # deflection of a cell by a pressure in another [m/Pa], shape (cells, cells)
-    stiffness_band: FloatArray = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, 'stiffness_band', _stiffness_band(self.cells, self.cell_width, self.modulus))
-
-    def deflection(self, pressure: FloatArray) -> FloatArray:
-        """Deflection [m] of each cell under ``pressure`` [Pa], shape (cells,)."""
-        deflected: FloatArray = self.compliance @ pressure
-        return deflected
 
     def matrix(self) -> FloatArray:
         """Full influence matrix [m/Pa], shape (cells, cells)."""
@@ -128,17 +108,12 @@ def condensed_body(
 
     .. math:: K = N C N^T + A - \Pi A \Pi,\quad \Pi = N (N^T N)^{-1} N^T
 
-    with the compliance C of the nodes, their hat functions N in the cells, and the influence matrix A of the
-    half-plane, which answers to what is shorter than the elements (the split is our choice). Where C is that of a
-    half-plane, K is A, whatever the mesh. A pressure that follows the surface makes C slightly unsymmetric; K is made
-    symmetric, and nowhere stiffer than A at its stiffest, which keeps it positive (our choice).
-
-    Args:
-        places: Centres of the cells [m], in equal steps, within the nodes, shape (n,).
-        nodes: Places of the nodes [m], increasing, shape (m,).
-        compliance: Displacement by a force on a node, all round [m/N], shape (m, m).
-        modulus: Plane-strain modulus E* [Pa].
-        circumference: Length that a force acts on [m]; 1 m for plane strain.
+    with the compliance C of the nodes, all round [m/N], shape (m, m), their hat functions N in the cells, and the
+    influence matrix A of the half-plane of the plane-strain ``modulus`` E* [Pa], which answers to what is shorter than
+    the elements (the split is our choice). Where C is that of a half-plane, K is A, whatever the mesh. A pressure that
+    follows the surface makes C slightly unsymmetric; K is made symmetric, and nowhere stiffer than A at its stiffest,
+    which keeps it positive (our choice). The centres of the cells ``places`` [m], shape (n,), are in equal steps within
+    the increasing ``nodes`` [m], shape (m,); a force acts on the ``circumference`` [m], 1 m for plane strain.
     """
     width = float(places[1] - places[0])
     hats = hat_functions(places, nodes)

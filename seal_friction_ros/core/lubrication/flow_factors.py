@@ -30,8 +30,7 @@ _LARGEST_RATIO = 7.0  # of the fit of phi_fs; 0 beyond
 def flow_factor_coefficients(peklenik_number: float) -> tuple[float, ...]:
     """Peklenik number and coefficients (C, r, A_1, alpha_1, alpha_2, alpha_3, A_2) for the compiled functions.
 
-    Raises:
-        ValueError: There are none for this number.
+    ValueError: there are none for this number.
 
     Source: N. Patir, H. S. Cheng 1978 (Table 2) and 1979 (Table 2).
     """
@@ -62,13 +61,7 @@ def shear_flow_factor(coefficients: tuple[float, ...], ratio: float) -> tuple[fl
 
     A_1 H^alpha_1 exp(-alpha_2 H + alpha_3 H^2) up to H = 5, then A_2 exp(-0.25 H).
     """
-    a_1, alpha_1, alpha_2, alpha_3, a_2 = (
-        coefficients[3],
-        coefficients[4],
-        coefficients[5],
-        coefficients[6],
-        coefficients[7],
-    )
+    _number, _c, _r, a_1, alpha_1, alpha_2, alpha_3, a_2 = coefficients
     if ratio > 5.0:
         factor = a_2 * math.exp(-0.25 * ratio)
         return factor, -0.25 * factor

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.integrate import trapezoid
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.errors import NotConvergedError
+from seal_friction_ros.core.foundation.errors import NotConvergedError, named_errors
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.lubrication.contact import ContactState, contact_step
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, MapGrid
@@ -27,14 +27,12 @@ _PASSAGES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0, 100.0, math.inf)  #
 _MOST_RETRIES = 20
 _MEMORY_STEPS = 200
 _LONG_PASSAGES = 250.0  # a step of so many is nearly one to the steady film
-DISCRETISATION = 0.03
-"""[-] of the friction: what counts as an error of mesh and grid (our choice)"""
+DISCRETISATION = 0.03  # [-] of the friction: what counts as an error of mesh and grid (our choice)
 PERCOLATION = 0.42
 """[-] real contact above which the contact leaves the lubricant no way through.
 
 Source: W. B. Dapp, A. Lücke, B. N. J. Persson, M. H. Müser 2012: the flow ends where the contact percolates."""
-THINNEST_OF_CLOSURES = 0.5
-"""[-] gap over rms roughness from which the flow factors of Patir and Cheng hold"""
+THINNEST_OF_CLOSURES = 0.5  # [-] gap over rms roughness from which the flow factors of Patir and Cheng hold
 
 
 class SteadyFriction(NamedTuple):
@@ -67,18 +65,12 @@ def map_pressures(grid: MapGrid) -> FloatArray:
     return np.linspace(0.0, grid.pressure_max, grid.pressures)
 
 
-class _AtRest(NamedTuple):
-    model: LubricationModel
-    start: ContactState
-    stiffness: float  # [N/m] axial
-
-
-def _at_rest(case: LubricationCase, pressure: float) -> _AtRest:
-    """The seal of a case at rest on a plain flooded wall, with ``pressure`` [Pa] on its left."""
+def _at_rest(case: LubricationCase, pressure: float) -> tuple[LubricationModel, ContactState, float]:
+    """The seal of a case at rest on a plain flooded wall, ``pressure`` [Pa] on its left; its axial stiffness [N/m]."""
     if case.oring is not None:
-        return _AtRest(*oring_film(case, case.oring, pressure))
+        return oring_film(case, case.oring, pressure)
     model = profile_model(case, pressure, 0.0)
-    return _AtRest(model, film_at_rest(model), case.groove.stiffness)
+    return model, film_at_rest(model), case.groove.stiffness
 
 
 def _friction(model: LubricationModel, state: ContactState, velocity: float) -> tuple[float, float]:
@@ -92,13 +84,8 @@ def _slid(
 ) -> tuple[ContactState, list[ContactState], int]:
     """Sliding at a ``velocity`` [m/s] by implicit Euler steps of ``durations`` [s]; one that fails is taken in halves.
 
-    An infinite step, to the steady film, is taken again after a finite one.
-
-    Returns:
-        The last state, that after each of ``durations``, and how many steps failed.
-
-    Raises:
-        NotConvergedError: More than 20 steps failed.
+    An infinite step, to the steady film, is taken again after a finite one. Returns the last state, that after each of
+    the durations, and how many steps failed. NotConvergedError: more than 20 steps failed.
     """
     state, states, retried = start, [], 0
     for duration in durations:
@@ -126,8 +113,7 @@ def _slid(
 def steady_state(model: LubricationModel, start: ContactState, velocity: float) -> tuple[ContactState, int]:
     """Film of steady sliding at a ``velocity`` [m/s] by ever longer steps from ``start``; how many steps failed.
 
-    Raises:
-        NotConvergedError: More than 20 steps failed.
+    NotConvergedError: more than 20 steps failed.
     """
     passage = model.film_width / abs(velocity)
     state, _, retried = _slid(model, start, velocity, [share * passage for share in _PASSAGES])
@@ -137,8 +123,7 @@ def steady_state(model: LubricationModel, start: ContactState, velocity: float) 
 def steady_friction(case: LubricationCase, pressure: float) -> SteadyFriction:
     """Steady sliding friction of a case at one pressure [Pa], both directions, over the speeds of its grid.
 
-    Raises:
-        NotConvergedError: A film did not converge; the message says at which speed and pressure.
+    NotConvergedError: a film did not converge; the message says at which speed and pressure.
     """
     model, begin, stiffness = _at_rest(case, pressure)
     real_contact = float(real_area_share(model.contact, begin.gap).max())
@@ -149,10 +134,9 @@ def steady_friction(case: LubricationCase, pressure: float) -> SteadyFriction:
     for k, direction in enumerate((1.0, -1.0)):
         state = begin
         for i, speed in enumerate(speeds):
-            try:
+            where = f'case {case.name} at {speed:.4g} m/s, {pressure:.4g} Pa'
+            with named_errors(where, NotConvergedError, NotConvergedError):
                 state, more = steady_state(model, state, direction * float(speed))
-            except NotConvergedError as error:
-                raise NotConvergedError(f'case {case.name} at {speed:.4g} m/s, {pressure:.4g} Pa: {error}') from None
             retried += more
             values[k, :, i] = _friction(model, state, direction * float(speed))
     friction, solid = values.mean(axis=0)
@@ -166,9 +150,7 @@ def memory_length(case: LubricationCase) -> MemoryLength:
 
     From steady sliding at a fifth of the highest speed of the motion the speed is set to the highest; the length is
     that of an exponential of the same area, the integral of (F - F_end) / (F_start - F_end) over the way.
-
-    Raises:
-        NotConvergedError: A step did not converge.
+    NotConvergedError: a step did not converge.
     """
     model, start, _ = _at_rest(case, 0.0)
     fast = case.motion.speed
@@ -186,10 +168,7 @@ def friction_map(case: LubricationCase, rows: list[SteadyFriction], memory: floa
     """The law from its computed rows, one for each pressure of the grid, in any order.
 
     The presliding length is friction over stiffness at 0 Pa. An O-ring that no pressure holds on its wall rolls, so its
-    length is that of the next pressure (our choice).
-
-    Raises:
-        ValueError: The rows are not those of the grid.
+    length is that of the next pressure (our choice). ValueError: the rows are not those of the grid.
     """
     ordered = sorted(rows, key=lambda row: row.pressure)
     pressures = map_pressures(case.map)

@@ -71,11 +71,7 @@ class ReferenceMotion(CheckedParameters):
 
 @dataclass(frozen=True)
 class MapGrid(CheckedParameters):
-    """Velocities and pressures of the friction map.
-
-    Raises:
-        ValueError: A value is out of bounds, or a range has no extent.
-    """
+    """Velocities and pressures of the friction map; ValueError: a value is out of bounds, or a range has no extent."""
 
     velocity_min: float = parameter(1e-4, unit='m/s', lower=1e-7, upper=10.0, description='Lowest speed.')
     velocity_max: float = parameter(0.1, unit='m/s', lower=1e-6, upper=100.0, description='Highest speed.')
@@ -85,22 +81,14 @@ class MapGrid(CheckedParameters):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.velocity_max <= self.velocity_min:
-            raise ValueError(
-                f'MapGrid.velocity_max = {self.velocity_max} m/s is not above velocity_min = {self.velocity_min} m/s'
-            )
+        self.check_order('velocity_max', 'velocity_min')
 
 
 @dataclass(frozen=True, kw_only=True)
 class LubricationCase:
-    """One seal, its wall and lubricant.
+    """One seal, its wall and lubricant; ValueError: two parts contradict each other."""
 
-    Raises:
-        ValueError: Two parts contradict each other.
-    """
-
-    OPTIONAL: ClassVar[Mapping[str, type]] = {}
-    """parts that act only if a case file names them"""
+    OPTIONAL: ClassVar[Mapping[str, type]] = {}  # parts that act only if a case file names them
 
     name: str
     source: str = ''
@@ -112,8 +100,7 @@ class LubricationCase:
     motion: ReferenceMotion = field(default_factory=ReferenceMotion)
     numerics: LubricationNumerics = field(default_factory=LubricationNumerics)
     map: MapGrid = field(default_factory=MapGrid)
-    oring: OringCase | None = None
-    """finite-element ring in the place of the profile of ``seal``"""
+    oring: OringCase | None = None  # finite-element ring in the place of the profile of ``seal``
     unknown: tuple[Unknown, ...] = ()
     """numbers that are not known exactly, those of the ring with ``oring.`` before their names"""
 
@@ -141,11 +128,7 @@ class LubricationCase:
 
 
 def no_oring(name: str) -> OringCaseFile:
-    """Loader of O-ring cases where there are none.
-
-    Raises:
-        ValueError: Always.
-    """
+    """Loader of O-ring cases where there are none; ValueError: always."""
     raise ValueError(f'oring = {name!r}: there are no O-ring cases here')
 
 
@@ -155,15 +138,10 @@ def parse_lubrication_case(document: Any, load_oring: Callable[[str], OringCaseF
 
 
 def parse_case(kind: type[Case], document: Any, load_oring: Callable[[str], OringCaseFile]) -> Case:
-    """Parse the document of the file of a ``kind`` of case.
+    """Parse the document of the file of a ``kind`` of case, `LubricationCase` or a class below it.
 
-    Args:
-        kind: `LubricationCase`, or a class below it.
-        document: Mapping of a YAML file.
-        load_oring: Gives the O-ring case file of a name or path.
-
-    Raises:
-        ValueError: A value is invalid; the message names case, field, value and bound.
+    ``load_oring`` gives the O-ring case file of a name or path. ValueError: a value is invalid; the message names case,
+    field, value and bound.
     """
     name, source = name_and_source(document, 'case')
     known = kind.parts()
@@ -212,10 +190,8 @@ def varied_case(case: Case, values: Mapping[str, float]) -> Case:
     """A case with other ``values`` of its unknowns, by their names, and nothing unknown.
 
     A surface with another ``rms_height`` or ``roll_off_length`` is the same one, stretched: its slope goes with height
-    over length. The ``rms_slope`` among the values is that before the stretch (our choice).
-
-    Raises:
-        ValueError: There is no such case.
+    over length. The ``rms_slope`` among the values is that before the stretch (our choice). ValueError: there is no
+    such case.
     """
     parts: dict[str, dict[str, float]] = {}
     for name, value in values.items():

@@ -40,10 +40,8 @@ def profile_model(case: LubricationCase, pressure_left: float, pressure_right: f
     """Model of a seal that is no O-ring, under pressures on both sides [Pa, gauge].
 
     The fluid acts on the seal from all sides, and rubber transmits its pressure like a fluid: only the pressure above
-    it deflects the seal. It falls linearly over the middle half of the film (our choice).
-
-    Raises:
-        ValueError: The grid does not fit the seal.
+    it deflects the seal. It falls linearly over the middle half of the film (our choice). ValueError: the grid does not
+    fit the seal.
     """
     numerics = case.numerics
     width = numerics.film_width / numerics.cells
@@ -59,11 +57,7 @@ def profile_model(case: LubricationCase, pressure_left: float, pressure_right: f
 
 
 def film_at_rest(model: LubricationModel) -> ContactState:
-    """Film of a flooded seal at rest: dry contact, the gap filled.
-
-    Raises:
-        NotConvergedError: The dry contact was not found.
-    """
+    """Film of a flooded seal at rest: dry contact, the gap filled; NotConvergedError: the dry contact was not found."""
     gap = dry_contact(model.contact, model.profile + model.contact.body.deflection(model.ambient))
     return ContactState(gap, np.array(model.ambient), np.ones(len(gap)))
 

@@ -42,9 +42,7 @@ class OringFilm(NamedTuple):
 def oring_film(case: LubricationCase, oring: OringCase, pressure: float) -> OringFilm:
     """Ring of a case under a fluid ``pressure`` [Pa] on its left.
 
-    Raises:
-        ValueError: The ring does not fit or does not seal.
-        NotConvergedError: The finite elements did not converge.
+    ValueError: the ring does not fit or does not seal; NotConvergedError: the finite elements did not converge.
     """
     elements = oring_model(oring)
     loaded = next(loaded_states(oring, elements, (pressure,)))

@@ -107,14 +107,9 @@ def reynolds_rows(
 def complementarity(pressure: FloatArray, saturation: FloatArray, scale: float) -> tuple[FloatArray, float]:
     """Newton's equation of Fischer and Burmeister, solved in each cell for the unknown that it determines best.
 
-    Args:
-        pressure: p [Pa], shape (n,).
-        saturation: theta, shape (n,).
-        scale: p_s [Pa].
-
-    Returns:
-        Numbers a, b, c, d of each cell, so that the changes of p and theta are a + b x and c + d x of the one unknown x
-        that is left, shape (4, n); largest residual of the equation.
+    Pressure p [Pa] and saturation theta have the shape (n,), the ``scale`` is p_s [Pa]. Returns numbers a, b, c, d of
+    each cell, so that the changes of p and theta are a + b x and c + d x of the one unknown x that is left, shape (4,
+    n), and the largest residual of the equation.
     """
     n = pressure.shape[0]
     kept = np.empty((4, n))

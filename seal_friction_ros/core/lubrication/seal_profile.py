@@ -15,8 +15,7 @@ HOLDS = ('bottom', 'bottom_and_flanks', 'sliding_bottom')
 class SealBody(CheckedParameters):
     """Shape and material of the seal. Shape: our choice (the paper's is confidential); material: Table 1.
 
-    Raises:
-        ValueError: A value is out of bounds, or the material has no stiffness.
+    ValueError: a value is out of bounds, or the material has no stiffness.
     """
 
     BODIES: ClassVar[tuple[str, ...]] = ('half_plane', 'finite_elements')

@@ -17,7 +17,7 @@ from seal_friction_ros.core.lubrication.seal_profile import LubricationNumerics,
 from seal_friction_ros.core.oring_contact.compliance import small_displacements
 from seal_friction_ros.core.oring_contact.equilibrium import OringModel, make_model, unstressed_state
 from seal_friction_ros.core.oring_contact.material import Rubber
-from seal_friction_ros.core.oring_contact.mesh import Mesh
+from seal_friction_ros.core.oring_contact.mesh import Mesh, outline_of, quadrilaterals_of
 from seal_friction_ros.core.oring_contact.surroundings import Surroundings
 
 _GROWTH = 8.0  # elements away from the film grow by this over their number under it, each over the last (our choice)
@@ -52,9 +52,7 @@ def seal_section(seal: SealBody, film_width: float, elements: int) -> SealSectio
     r = bottom + (crown - bottom) * (1.0 - depth / seal.section_height)[:, None]
     nodes = np.stack((r, np.broadcast_to(along, r.shape)), axis=-1).reshape(-1, 2)
     index = np.arange(r.size).reshape(r.shape)
-    corners = (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:])
-    around = np.concatenate((index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]))
-    mesh = Mesh(nodes, np.stack([corner.ravel() for corner in corners], axis=1), around)
+    mesh = Mesh(nodes, quadrilaterals_of(index), outline_of(index))
     model = make_model(mesh, section_rubber(seal), seal.section_height, 0.0)
     face = index[-1, len(beside) - 1 : len(beside) + elements]
     return SealSection(model, face, under, _held(seal.section_hold, index))
@@ -69,8 +67,7 @@ def section_rubber(seal: SealBody) -> Rubber:
 def face_compliance(section: SealSection) -> FaceCompliance:
     """Compliance of the face of the unloaded section, held at its groove.
 
-    Raises:
-        NotConvergedError: The stiffness is singular.
+    NotConvergedError: the stiffness is singular.
     """
     model, face = section.model, section.face
     middle = np.abs(section.place) <= 0.25 * np.ptp(section.place)
@@ -90,9 +87,7 @@ def nothing_around(model: OringModel) -> Surroundings:
 def seal_body(seal: SealBody, numerics: LubricationNumerics) -> ElasticBody:
     """Body of a seal on the cells of its film.
 
-    Raises:
-        ValueError: The grid does not fit the body.
-        NotConvergedError: The stiffness of the finite elements is singular.
+    ValueError: the grid does not fit the body; NotConvergedError: the stiffness of the finite elements is singular.
     """
     cells, width = numerics.cells, numerics.film_width / numerics.cells
     if seal.body != 'finite_elements':

@@ -26,11 +26,8 @@ class Topography(CheckedParameters):
     is the same for small pressures and keeps the gap open at any pressure (our choice).
 
     Below zero separation (with ``filling``, below 2 % of l) the law goes on as its tangent (our choice: a converged
-    result is never there, but a Newton iteration may be).
-
-    Raises:
-        ValueError: A value is out of bounds, there are no flow factors for the Peklenik number, or the slope is less
-            than roughness of that height can have.
+    result is never there, but a Newton iteration may be). ValueError: a value is out of bounds, there are no flow
+    factors for the Peklenik number, or the slope is less than roughness of that height can have.
 
     Source: B. N. J. Persson 2001 (area), 2007 (separation); the two numbers hold for a self-affine surface of Hurst
     exponent 0.8.

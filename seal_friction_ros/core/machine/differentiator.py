@@ -64,15 +64,10 @@ NO_WINDOW = Window()
 
 
 def chosen_differentiator(step: float, rate: float, noise: float) -> Differentiator:
-    """The differentiator with the smallest delay whose noise is at most ``noise``.
+    """The differentiator with the smallest delay whose velocity has a noise of at most ``noise`` [m/s].
 
-    Args:
-        step: Encoder step [m]; 0.0: not rounded.
-        rate: Samples per second [Hz].
-        noise: Largest standard deviation of the velocity [m/s].
-
-    Raises:
-        ValueError: It would be older than `LONGEST_DELAY` or need more than `MOST_SAMPLES`.
+    The encoder has steps of ``step`` [m], 0.0: none, and ``rate`` samples per second [Hz]. ValueError: it would be
+    older than `LONGEST_DELAY` or need more than `MOST_SAMPLES`.
     """
     best = Differentiator(2, 1.0 / rate, step)
     for samples in range(2, MOST_SAMPLES + 1):

@@ -63,8 +63,7 @@ _REFERENCE = tuple(_PLACE[f'reference_{name}'] for name in ('position', 'velocit
 
 KEPT = (Pressure, Force)  # records that are kept for the next velocity, and no more
 
-Emit = Callable[[str, Output, bytes], object]
-"""Takes an answer: name of the actuator, record, frame name."""
+Emit = Callable[[str, Output, bytes], object]  # Takes an answer: name of the actuator, record, frame name.
 
 
 class Wiring(NamedTuple):
@@ -166,10 +165,8 @@ def make_machine(
 ) -> Machine:
     """Machine from its mapping file; ValueError, with topic and field, if a type is not known or has no such field.
 
-    Args:
-        file: The mapping.
-        configurations: Name of each actuator -> its seals and settings.
-        definitions: Type of each topic (``package/Name``) -> its definition; not used by the built-in mapping.
+    Configurations are by name of the actuator, definitions by type of the topic (``package/Name``); the built-in
+    mapping uses none of these.
     """
     actuators = tuple(_actuator(mapping, file, configurations[mapping.name]) for mapping in file.actuators)
     if file.document is None:
@@ -371,13 +368,8 @@ def records_of(
 ) -> tuple[Memory, list[Input]]:
     """Records that one message makes for an actuator, in the order in which the estimator takes them; the next memory.
 
-    Args:
-        actuator: The actuator.
-        memory: Of the message before.
-        taken: What the actuator takes of the message.
-        numbers: Of the message; None where it does not hold one.
-        stamp: Of the message [ns].
-        frame_id: Of the message.
+    Of the ``numbers`` of the message, None where it does not hold one, the actuator takes what is ``taken``. ``stamp``
+    [ns] and ``frame_id`` are those of the message.
     """
     given_values, given_stamps, pressure_stamp, force_stamp, window, reference_window = memory
     values, stamps, changed = list(given_values), list(given_stamps), 0

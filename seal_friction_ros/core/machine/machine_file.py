@@ -97,8 +97,7 @@ class Signal:
     absolute: bool = False  # a pressure from which the ambient pressure is taken off
 
 
-Source = Signal | float
-"""Where a value comes from: a message, or it is constant [SI]."""
+Source = Signal | float  # Where a value comes from: a message, or it is constant [SI].
 
 
 @dataclass(frozen=True)

@@ -32,15 +32,10 @@ class Command(NamedTuple):
 
 
 def commands(file: MachineFile, forces: Mapping[str, float], stamp: int) -> list[Command]:
-    """Messages for the controllers, one for each topic, in order of the mapping file.
+    """Messages for the controllers, one for each topic, in order of the mapping file, stamped with ``stamp`` [ns].
 
-    Args:
-        file: The mapping file.
-        forces: Name of each actuator -> newest feed-forward [N]; one that is not finite or not there counts as 0.
-        stamp: Of the messages with a header [ns].
-
-    Returns:
-        The messages; an element of an array that no actuator has is 0.
+    ``forces`` has the newest feed-forward of each actuator [N] by name; one that is not finite or not there counts as
+    0, as does an element of an array that no actuator has.
     """
     topics: dict[str, list[tuple[Output, float]]] = {}
     for actuator in file.actuators:

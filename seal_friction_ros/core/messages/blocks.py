@@ -34,8 +34,7 @@ class Kind(IntEnum):
     ESTIMATE = 7
     FEEDFORWARD = 8
     CONFIGURATION = 9
-    OTHER_ESTIMATE = 10
-    """of another estimator"""
+    OTHER_ESTIMATE = 10  # of another estimator
     POSITION = 11
 
 

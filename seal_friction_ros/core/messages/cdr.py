@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 
 from seal_friction_ros.core.messages.definitions import PRIMITIVES, STRING, Definition, Field, short_name
 
-ENCODING = 'cdr'
-"""Name of this encoding in bags."""
+ENCODING = 'cdr'  # Name of this encoding in bags.
 ENCAPSULATION = b'\x00\x01\x00\x00'  # little endian, no options
 LITTLE_ENDIAN = ENCAPSULATION[:2]
 ORIGIN = len(ENCAPSULATION)  # [bytes] alignment counts from here

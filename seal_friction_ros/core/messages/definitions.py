@@ -49,12 +49,8 @@ def full_name(type_name: str) -> str:
 def parse_definition(type_name: str, text: str) -> Definition:
     """Definition of a message from its text (``ros2msg``), as MCAP and SQLite bags hold it.
 
-    Args:
-        type_name: Type of the message.
-        text: Its fields, then those of each message in it after a line of ``=`` and ``MSG: package/Name``.
-
-    Raises:
-        ValueError: The text is not such a definition, a message in it is not defined, or there are too many levels.
+    The text has its fields, then those of each message in it after a line of ``=`` and ``MSG: package/Name``.
+    ValueError: the text is not such a definition, a message in it is not defined, or there are too many levels.
     """
     found: dict[str, list[Field]] = {}
     name = short_name(type_name)

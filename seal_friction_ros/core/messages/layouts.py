@@ -34,8 +34,7 @@ NEWEST_TYPE = 'std_msgs/msg/UInt8MultiArray'
 NUMBER_TYPE, NUMBERS_TYPE = 'std_msgs/msg/Float64', 'std_msgs/msg/Float64MultiArray'
 JOINTS_TYPE = 'sensor_msgs/msg/JointState'
 
-CLOCK_TOPIC = '/clock'
-"""Simulated time, an input of nodes with ``use_sim_time``."""
+CLOCK_TOPIC = '/clock'  # Simulated time, an input of nodes with ``use_sim_time``.
 
 INPUTS: dict[str, str] = {
     'cylinder_pressure': PRESSURE_TYPE,
@@ -53,8 +52,7 @@ OUTPUTS: dict[str, str] = {'friction_estimate': ESTIMATE_TYPE, 'friction_feedfor
 LONGEST_FRAME = 1024  # [bytes] our choice; a longer frame name is not valid
 SECOND = 1_000_000_000  # [ns]
 
-Check = Callable[[Any], object]
-"""Raises ValueError for a record that is not valid."""
+Check = Callable[[Any], object]  # Raises ValueError for a record that is not valid.
 
 
 class Layout(NamedTuple):

@@ -167,8 +167,7 @@ class FeedForward(NamedTuple):
 
 Input = Pressure | Force | ServoReference | Position | Temperature | Velocity | Clock | WatchdogTick
 """A message that the estimator takes."""
-Output = FrictionEstimate | FeedForward
-"""A message that the estimator makes."""
+Output = FrictionEstimate | FeedForward  # A message that the estimator makes.
 
 
 def field_names(record: Any) -> tuple[str, ...]:

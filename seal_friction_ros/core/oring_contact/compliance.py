@@ -14,7 +14,7 @@ from scipy.sparse import dia_array
 from scipy.sparse.linalg import splu
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.errors import NotConvergedError
+from seal_friction_ros.core.foundation.errors import NotConvergedError, named_errors
 from seal_friction_ros.core.oring_contact.equilibrium import (
     OringModel,
     OringState,
@@ -49,8 +49,7 @@ class SlidingFace(NamedTuple):
 def sliding_face(model: OringModel, loaded: LoadedRing, wall: int) -> SlidingFace:
     """The face of a loaded ring on ``wall``, `ROD` or `GLAND`, with the stiffness of the ring without that wall.
 
-    Raises:
-        NotConvergedError: The stiffness is singular.
+    NotConvergedError: the stiffness is singular.
     """
     inward = 1.0 if wall == ROD else -1.0  # towards the axis
     position = outline(model, loaded.state)
@@ -100,18 +99,10 @@ def small_displacements(
     springs: FloatArray | None = None,
     held: tuple[int, ...] = (),
 ) -> FloatArray:
-    """Displacements by small loads about a state [m].
+    """Displacements of a meshed ring or section by small ``loads`` [N] about an equilibrium [m], both (2 n, columns).
 
-    Args:
-        model: Meshed ring or section.
-        surroundings: Walls and fluid that give way or push back.
-        state: Equilibrium.
-        loads: [N], shape (2 n, columns).
-        springs: Stiffness of springs to the ground [N/m], shape (2 n,); default: none.
-        held: Displacements that are zero (2 node for r, 2 node + 1 for z).
-
-    Raises:
-        NotConvergedError: An element is inverted, or the stiffness is singular.
+    ``springs`` to the ground have a stiffness [N/m], shape (2 n,). Displacements that are ``held`` are zero (2 node for
+    r, 2 node + 1 for z). NotConvergedError: an element is inverted, or the stiffness is singular.
     """
     balance = force_balance(model, surroundings, state)
     if balance is None:
@@ -122,8 +113,6 @@ def small_displacements(
         size = len(assembly.free)
         matrix = matrix + dia_array((springs[None, assembly.free], np.zeros(1, int)), shape=(size, size))
     moved = np.zeros_like(loads)
-    try:
+    with named_errors('small_displacements: the stiffness is singular', RuntimeError, NotConvergedError):
         moved[assembly.free] = splu(matrix.tocsc()).solve(loads[assembly.free])
-    except RuntimeError as error:
-        raise NotConvergedError(f'small_displacements: the stiffness is singular: {error}') from None
     return moved

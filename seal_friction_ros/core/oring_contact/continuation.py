@@ -31,17 +31,10 @@ def follow_path(
 ) -> PathEnd:
     """Follow the equilibrium along a path of surroundings.
 
-    Args:
-        model: The ring.
-        assembly: Its free displacements.
-        path: Surroundings at a fraction of the path, 0 to 1, given the last equilibrium.
-        start: Equilibrium at 0.
-        stride: First step, as a fraction of the path.
-        guess: Start state of Newton's method, given the last equilibrium, its fraction and the next fraction; by
-            default the linear extrapolation of the last two equilibria.
-
-    Raises:
-        NotConvergedError: A step fails at the smallest size; the message has the fraction reached.
+    ``path`` gives the surroundings at a fraction of the path, 0 to 1, and the last equilibrium, from ``start`` at 0;
+    the first step is the fraction ``stride``. ``guess`` gives the start of Newton's method from the last equilibrium,
+    its fraction and the next one, by default the linear extrapolation of the last two equilibria. NotConvergedError: a
+    step fails at the smallest size; the message has the fraction reached.
     """
     done, state, before, total = 0.0, start, (0.0, start), 0
     surroundings = path(0.0, start)

@@ -7,7 +7,7 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
-from seal_friction_ros.core.foundation.errors import NotConvergedError
+from seal_friction_ros.core.foundation.errors import NotConvergedError, named_errors
 from seal_friction_ros.core.oring_contact.elements import (
     Elements,
     deformation_gradient,
@@ -19,10 +19,8 @@ from seal_friction_ros.core.oring_contact.material import Rubber
 from seal_friction_ros.core.oring_contact.mesh import Mesh
 from seal_friction_ros.core.oring_contact.surroundings import Surroundings, outline_freedoms, surface_forces
 
-TOLERANCE = 1e-9
-"""Largest residual force at a node over 2 pi R E d (our choice)."""
-MAX_ITERATIONS = 25
-"""Limit of Newton steps (our choice: good load steps take 3 to 8)."""
+TOLERANCE = 1e-9  # Largest residual force at a node over 2 pi R E d (our choice).
+MAX_ITERATIONS = 25  # Limit of Newton steps (our choice: good load steps take 3 to 8).
 _SHORTEST_STEP = 1.0 / 64.0  # of the full Newton step, below which an inverted element is an error
 _PIVOT = 0.01  # diagonal entry over the largest of its column, above which it is the pivot: little fill-in
 
@@ -65,17 +63,12 @@ class ForceBalance(NamedTuple):
 
 
 def make_model(mesh: Mesh, rubber: Rubber, section_diameter: float, guide: float) -> OringModel:
-    """Model of a meshed ring.
+    """Model of a meshed ring of ``section_diameter`` d [m].
 
     Between frictionless walls a round ring rolls almost freely: only its hoop strain resists, and the facets of the
     mesh make the motion jump. The guide, a couple without net force, keeps the two nodes halfway to rod and gland at
-    the same axial position (our choice; docs/oring.md has its influence).
-
-    Args:
-        mesh: Mesh of the section.
-        rubber: Material.
-        section_diameter: d [m].
-        guide: Stiffness of the guide over 2 pi R E, R the radius of the ring.
+    the same axial position (our choice; docs/oring.md has its influence). Its stiffness ``guide`` is that over 2 pi R
+    E, R the radius of the ring.
     """
     center = mesh.nodes.mean(axis=0)
     quarter = np.array([section_diameter / 4.0, 0.0])
@@ -148,8 +141,7 @@ def solve_equilibrium(
 ) -> tuple[OringState, int]:
     """Equilibrium state from a start state, and the number of Newton steps.
 
-    Raises:
-        NotConvergedError: An element is inverted, the stiffness is singular, or 25 steps do not converge.
+    NotConvergedError: an element is inverted, the stiffness is singular, or 25 steps do not converge.
     """
     state, now = start, force_balance(model, surroundings, start)
     if now is None:
@@ -163,12 +155,10 @@ def solve_equilibrium(
         if imbalance < TOLERANCE:
             return OringState(state.displacement, now.tension), step
         matrix = stiffness_matrix(assembly, now.entries)
-        try:
+        with named_errors('the stiffness is singular', RuntimeError, NotConvergedError):
             factors = splu(
                 matrix, permc_spec='MMD_AT_PLUS_A', diag_pivot_thresh=_PIVOT, options={'SymmetricMode': True}
             )
-        except RuntimeError as error:
-            raise NotConvergedError(f'the stiffness is singular: {error}') from None
         state, now = _take_newton_step(model, surroundings, state, now, assembly.free, factors.solve(residual))
     raise NotConvergedError(f'residual of {imbalance:.1e} 2 pi R E d after {MAX_ITERATIONS} Newton steps')
 

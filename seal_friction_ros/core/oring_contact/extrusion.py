@@ -14,15 +14,11 @@ _CLEARANCES = {
 
 
 def extrusion_pressure(diametral_clearance: float, elastic_modulus: float) -> float:
-    """Highest pressure [Pa, gauge] without a back-up ring.
+    """Highest pressure [Pa, gauge] without a back-up ring, from the clearance behind it [m] and the modulus E [Pa].
 
-    The logarithm of the pressure is interpolated linearly over clearance (and extrapolated beyond the table), then
-    over hardness from 70 to 90 Shore A. Below 70 Shore A the limit of 70 is scaled with the modulus; above 90 the limit
-    of 90 holds.
-
-    Args:
-        diametral_clearance: Diametral clearance behind the ring [m].
-        elastic_modulus: E of the rubber [Pa]; gives its hardness.
+    The logarithm of the pressure is interpolated linearly over clearance (and extrapolated beyond the table), then over
+    hardness from 70 to 90 Shore A. Below 70 Shore A the limit of 70 is scaled with the modulus; above 90 the limit of
+    90 holds.
 
     Source: [SealDesign]_, Limits of Diametral Clearance Against Fluid Pressure, at the upper end of each band.
     Interpolation and extrapolation are our choice.

@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from typing import NamedTuple
 
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
-from seal_friction_ros.core.foundation.errors import NotConvergedError
+from seal_friction_ros.core.foundation.errors import NotConvergedError, named_errors
 from seal_friction_ros.core.friction.geometry import projected_area
 from seal_friction_ros.core.oring_contact.continuation import follow_path
 from seal_friction_ros.core.oring_contact.equilibrium import (
@@ -58,10 +59,8 @@ def loaded_states(case: OringCase, model: OringModel, pressures: tuple[float, ..
     """Equilibria at increasing pressures [Pa, gauge].
 
     At 0 Pa the ring is squeezed only and does not touch the downstream wall, as in the first case of the thesis.
-
-    Raises:
-        ValueError: The pressures are invalid, the squeezed ring is longer than the groove, or fluid passes the ring.
-        NotConvergedError: Newton's method did not converge.
+    ValueError: the pressures are invalid, the squeezed ring is longer than the groove, or fluid passes the ring;
+    NotConvergedError: Newton's method did not converge.
     """
     check_pressures(case, pressures)
     now = squeeze_ring(case, model)
@@ -87,11 +86,8 @@ def squeeze_ring(case: OringCase, model: OringModel) -> LoadedRing:
     """Ring squeezed between rod and gland, with one node fixed along the axis.
 
     The walls move from first contact with the free ring to their final radii at reduced penalty, then the penalty rises
-    to its full value.
-
-    Raises:
-        ValueError: The squeezed ring is longer than the groove.
-        NotConvergedError: Newton's method did not converge.
+    to its full value. ValueError: the squeezed ring is longer than the groove; NotConvergedError: Newton's method did
+    not converge.
     """
     assembly, walls = make_assembly(model, _fixed(model)), _dry_walls(case, model)
     inner = case.geometry.ring_inner_diameter / 2.0
@@ -109,11 +105,9 @@ def squeeze_ring(case: OringCase, model: OringModel) -> LoadedRing:
     def stiffening(share: float, _: OringState) -> Surroundings:
         return walls._replace(penalty=walls.penalty * _SOFTER ** (share - 1.0))
 
-    try:
+    with _named(case, 'of the squeezed ring'):
         closed = follow_path(model, assembly, closing, unstressed_state(model), _SQUEEZE_STRIDE, stretched)
         reached = follow_path(model, assembly, stiffening, closed.state, _STIFFEN_STRIDE)
-    except NotConvergedError as error:
-        raise NotConvergedError(f'case {case.name}: no equilibrium of the squeezed ring: {error}') from None
     length = float(np.ptp(outline(model, reached.state)[:, 1]))
     if length >= case.groove.width:
         raise ValueError(
@@ -128,27 +122,25 @@ def seat_ring(case: OringCase, model: OringModel, free: Assembly, squeezed: Load
 
     The wall is placed at the ring, with a small penetration, so the ring need not cross a gap. One node of the ring
     stays fixed while the wall takes load; it is then released under the pressure that balances the wall force.
-
-    Raises:
-        NotConvergedError: Newton's method did not converge.
+    NotConvergedError: Newton's method did not converge.
     """
     top = float(outline(model, squeezed.state)[:, 1].max())
     wall = squeezed.surroundings._replace(
         wall_position=top - _SEATING * case.geometry.section_diameter,
         transition=case.numerics.transition * case.rubber.elastic_modulus,
     )
-    try:
+    with _named(case, 'of the ring on the downstream wall'):
         state, steps = solve_equilibrium(model, make_assembly(model, _fixed(model)), wall, squeezed.state)
         position = outline(model, state)
         axial = surface_pressure(wall, position).total * node_areas(position)[:, 1]
         pressure = float(axial[position[:, 1] > 0.0].sum()) / projected_area(case.geometry)
         surroundings = wall._replace(pressure=pressure, wetted=wetted_nodes(wall, position))
         state, more = solve_equilibrium(model, free, surroundings, state)
-    except NotConvergedError as error:
-        raise NotConvergedError(
-            f'case {case.name}: no equilibrium of the ring on the downstream wall: {error}'
-        ) from None
     return LoadedRing(pressure, surroundings, state, squeezed.newton_steps + steps + more)
+
+
+def _named(case: OringCase, which: str) -> AbstractContextManager[None]:
+    return named_errors(f'case {case.name}: no equilibrium {which}', NotConvergedError, NotConvergedError)
 
 
 def wetted_nodes(surroundings: Surroundings, position: FloatArray) -> BoolArray:
@@ -174,12 +166,8 @@ def _raise_pressure(
         return now.surroundings._replace(pressure=now.pressure + share * (target - now.pressure), wetted=wetted)
 
     total_rise = abs(target - now.pressure)
-    try:
+    with _named(case, f'between {now.pressure:.6g} and {target:.6g} Pa'):
         reached = follow_path(model, free, rising, now.state, min(rise / total_rise, 1.0))
-    except NotConvergedError as error:
-        raise NotConvergedError(
-            f'case {case.name}: no equilibrium between {now.pressure:.6g} and {target:.6g} Pa: {error}'
-        ) from None
     newton_steps = now.newton_steps + reached.newton_steps
     return LoadedRing(target, reached.surroundings, reached.state, newton_steps), reached.stride * total_rise
 
@@ -192,13 +180,8 @@ def _apply_wall_friction(case: OringCase, model: OringModel, free: Assembly, loa
     def rubbing(share: float, _: OringState) -> Surroundings:
         return loaded.surroundings._replace(friction=share * case.wall_friction)
 
-    try:
+    with _named(case, f'at {loaded.pressure:.6g} Pa with wall_friction = {case.wall_friction}'):
         reached = follow_path(model, free, rubbing, loaded.state, _FRICTION_STRIDE)
-    except NotConvergedError as error:
-        raise NotConvergedError(
-            f'case {case.name}: no equilibrium at {loaded.pressure:.6g} Pa with wall_friction = {case.wall_friction}: '
-            f'{error}'
-        ) from None
     return LoadedRing(loaded.pressure, reached.surroundings, reached.state, loaded.newton_steps + reached.newton_steps)
 
 

@@ -23,11 +23,7 @@ from seal_friction_ros.core.foundation.parameters import CheckedParameters, para
 
 @dataclass(frozen=True)
 class Rubber(CheckedParameters):
-    """Material constants.
-
-    Raises:
-        ValueError: A value is out of bounds, or the bulk modulus is below 20 E.
-    """
+    """Material constants; ValueError: a value is out of bounds, or the bulk modulus is below 20 E."""
 
     elastic_modulus: float = parameter(
         unit='Pa', lower=1e4, upper=1e10, description="Young's modulus at small strain, E."
@@ -58,10 +54,8 @@ def mooney_rivlin_constants(rubber: Rubber) -> tuple[float, float]:
 def elastic_modulus_of_hardness(shore_a: float) -> float:
     """Young's modulus [Pa] of a rubber of hardness ``shore_a`` [Shore A].
 
-    E = 0.0981 MPa (56 + 7.62336 S) / (0.137505 (254 - 2.54 S)); 5.52 MPa at 70.
-
-    Raises:
-        ValueError: The hardness is not between 20 and 95.
+    E = 0.0981 MPa (56 + 7.62336 S) / (0.137505 (254 - 2.54 S)); 5.52 MPa at 70. ValueError: the hardness is not between
+    20 and 95.
 
     Source: [Gent1958]_; the bounds are our choice.
     """

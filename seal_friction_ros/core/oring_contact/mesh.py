@@ -7,10 +7,8 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 
-CORE = 0.5
-"""Half width of the core over the section radius (our choice: well-shaped elements)."""
-ROUNDING = 0.4
-"""Bending of the core's sides towards a circle, 0 to 1 (our choice: well-shaped elements)."""
+CORE = 0.5  # Half width of the core over the section radius (our choice: well-shaped elements).
+ROUNDING = 0.4  # Bending of the core's sides towards a circle, 0 to 1 (our choice: well-shaped elements).
 LAYER_RATIO = 0.5
 """Thickness of the outermost over that of the innermost layer (our choice: the contact is at the surface)."""
 CROWDING = 0.4
@@ -28,16 +26,10 @@ class Mesh(NamedTuple):
 
 
 def o_grid(section_diameter: float, center_radius: float, lines: int) -> Mesh:
-    """O-grid of a circular section.
+    """O-grid of a circular section of diameter d [m], whose centre is ``center_radius`` [m] off the axis.
 
-    Args:
-        section_diameter: Diameter of the section, d [m].
-        center_radius: Distance of its centre from the axis [m].
-        lines: Grid lines that end on the quarter of the outline that faces the rod, at least 5; the same number face
-            the gland, fewer the wall and the fluid.
-
-    Raises:
-        ValueError: ``lines`` is below 5.
+    So many grid ``lines`` end on the quarter of the outline that faces the rod; the same number face the gland, fewer
+    the wall and the fluid. ValueError: ``lines`` is below 5.
     """
     if lines < 5:
         raise ValueError(f'o_grid: lines = {lines} is below 5: the contact would have one or two nodes')
@@ -45,14 +37,14 @@ def o_grid(section_diameter: float, center_radius: float, lines: int) -> Mesh:
     r_sides = max(2, round(AXIAL_SHARE * z_sides))
     layers = max(2, round(0.5 * z_sides))
     position, index = _core(r_sides, z_sides)
-    around = _outline(index)
+    around = np.roll(outline_of(index), index.shape[1] // 2)  # from the middle of the side nearest to the axis
     circle = position[around] / np.linalg.norm(position[around], axis=1, keepdims=True)
     share = np.cumsum(np.geomspace(1.0, LAYER_RATIO, layers))
     nodes, rows = [position], [around]
     for layer, fraction in enumerate(share / share[-1]):
         nodes.append((1.0 - fraction) * position[around] + fraction * circle)
         rows.append(len(position) + layer * len(around) + np.arange(len(around)))
-    blocks = [_core_quadrilaterals(index), *(_layer_quadrilaterals(a, b) for a, b in pairwise(rows))]
+    blocks = [quadrilaterals_of(index), *(_layer_quadrilaterals(a, b) for a, b in pairwise(rows))]
     center = np.array([center_radius, 0.0])
     return Mesh(center + section_diameter / 2.0 * np.concatenate(nodes), np.concatenate(blocks), rows[-1])
 
@@ -76,16 +68,13 @@ def _tangents(sides: int) -> FloatArray:
     return np.tan(angle)
 
 
-def _outline(index: IntArray) -> IntArray:
-    """Indices around the core, counterclockwise from the middle of the side nearest to the axis.
-
-    With an odd number of edges on that side, the first index is the node after the middle.
-    """
-    loop = np.concatenate((index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]))
-    return np.roll(loop, index.shape[1] // 2)
+def outline_of(index: IntArray) -> IntArray:
+    """Indices around a grid of them, counterclockwise from its first corner."""
+    return np.concatenate((index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]))
 
 
-def _core_quadrilaterals(index: IntArray) -> IntArray:
+def quadrilaterals_of(index: IntArray) -> IntArray:
+    """Corners of the quadrilaterals of a grid of indices, shape (e, 4)."""
     corners = (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:])
     return np.stack([corner.ravel() for corner in corners], axis=1)
 

@@ -12,11 +12,7 @@ from seal_friction_ros.core.oring_contact.material import Rubber
 
 @dataclass(frozen=True)
 class Groove(CheckedParameters):
-    """Dimensions of the gland besides its diameters.
-
-    Raises:
-        ValueError: A dimension is out of bounds.
-    """
+    """Dimensions of the gland besides its diameters; ValueError: a dimension is out of bounds."""
 
     width: float = parameter(unit='m', lower=1e-4, upper=1.0, description='Axial distance between the two side walls.')
     diametral_clearance: float = parameter(
@@ -63,10 +59,8 @@ class OringCase(CheckedParameters):
     """A ring in its gland.
 
     ``wall_friction`` opposes the motion of the ring towards the downstream wall, on rod and gland alike; it acts only
-    under pressure. All case files in config/oring leave it at 0; it serves sensitivity studies.
-
-    Raises:
-        ValueError: A value is out of bounds, the ring is not squeezed, or the gland is overfilled.
+    under pressure. All case files in config/oring leave it at 0; it serves sensitivity studies. ValueError: a value is
+    out of bounds, the ring is not squeezed, or the gland is overfilled.
     """
 
     name: str
@@ -126,8 +120,7 @@ def gland_fill(geometry: SealGeometry, groove: Groove) -> float:
 def check_pressures(case: OringCase, pressures: tuple[float, ...]) -> None:
     """Check pressures [Pa, gauge] for a computation in increasing order.
 
-    Raises:
-        ValueError: The pressures are empty, not finite, negative or not increasing, or extrude the ring.
+    ValueError: the pressures are empty, not finite, negative or not increasing, or extrude the ring.
     """
     if not pressures:
         raise ValueError(f'case {case.name}: no pressures to compute')

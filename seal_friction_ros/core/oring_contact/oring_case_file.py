@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.foundation.parameters import (
     CheckedParameters,
     check_names,
@@ -49,8 +50,7 @@ _KEYS = (
 class MeasuredFriction(CheckedParameters):
     """Measured friction, for comparison with the computed one.
 
-    Raises:
-        ValueError: A value is out of bounds, or the numbers of frictions and pressures differ.
+    ValueError: a value is out of bounds, or the numbers of frictions and pressures differ.
     """
 
     seals: int = parameter(unit='', lower=1, upper=100, description='Number of seals in the measured friction.')
@@ -91,8 +91,7 @@ class _Pressures:
 def parse_oring_case(document: Any) -> OringCaseFile:
     """Parse the document of a case file.
 
-    Raises:
-        ValueError: A value is invalid; the message names case, field, value and bound.
+    ValueError: a value is invalid; the message names case, field, value and bound.
     """
     name, source = name_and_source(document, 'case')
     where = f'case {name}'
@@ -115,7 +114,10 @@ def parse_oring_case(document: Any) -> OringCaseFile:
     check_pressures(case, pressures)
     friction = _friction(document, where)
     unknown = _unknown(document, case, friction is not None, where)
-    return OringCaseFile(case, pressures, source, friction, _measured(document, where), unknown)
+    measured = document.get('measured')
+    if measured is not None:
+        measured = from_mapping(MeasuredFriction, measured, f'{where}: measured')
+    return OringCaseFile(case, pressures, source, friction, measured, unknown)
 
 
 def _rubber(values: Any, where: str) -> Rubber:
@@ -125,10 +127,8 @@ def _rubber(values: Any, where: str) -> Rubber:
     others = {key: value for key, value in values.items() if key != 'hardness'}
     if 'hardness' in values:
         hardness = from_mapping(_Hardness, {'hardness': values['hardness']}, where).hardness
-        try:
+        with named_errors(where):
             others['elastic_modulus'] = elastic_modulus_of_hardness(hardness)
-        except ValueError as error:
-            raise ValueError(f'{where}: {error}') from None
     return from_mapping(Rubber, others, where)
 
 
@@ -167,11 +167,6 @@ def _friction(document: Mapping[str, Any], where: str) -> SealFriction | None:
     return SealFriction(law, uncertainty, stiction.stiction, stiction.stiction_ratio)
 
 
-def _measured(document: Mapping[str, Any], where: str) -> MeasuredFriction | None:
-    values = document.get('measured')
-    return None if values is None else from_mapping(MeasuredFriction, values, f'{where}: measured')
-
-
 # -- what is not known ------------------------------------------------------------------------------------------------
 
 FRICTION_COEFFICIENT, HARDNESS = 'friction_coefficient', 'rubber.hardness'
@@ -180,8 +175,7 @@ FRICTION_COEFFICIENT, HARDNESS = 'friction_coefficient', 'rubber.hardness'
 def varied_ring(case: OringCase, values: Mapping[str, float]) -> OringCase:
     """A case with other ``values`` of its unknowns, by their names; a hardness [Shore A] gives the modulus.
 
-    Raises:
-        ValueError: There is no such ring.
+    ValueError: there is no such ring.
     """
     parts: dict[str, dict[str, float]] = {}
     others: dict[str, Any] = {}

@@ -7,20 +7,12 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.friction.laws.contact_shear import REFERENCE_STRESS
+from seal_friction_ros.core.oring_contact import surroundings as walls
 from seal_friction_ros.core.oring_contact.elements import deformation_gradient, volume_ratios
 from seal_friction_ros.core.oring_contact.equilibrium import OringModel, outline
 from seal_friction_ros.core.oring_contact.loading import LoadedRing, loaded_states, oring_model
 from seal_friction_ros.core.oring_contact.material import von_mises_stress
 from seal_friction_ros.core.oring_contact.oring_case import OringCase
-from seal_friction_ros.core.oring_contact.surroundings import (
-    GLAND,
-    ROD,
-    WALL,
-    SurfacePressure,
-    node_areas,
-    surface_pressure,
-    wall_stresses,
-)
 
 _TOUCHING = 20.0  # distance from a wall, in transitions, beyond which the contact stress is negligible
 
@@ -83,9 +75,8 @@ class OringResult(NamedTuple):
 def oring_results(case: OringCase, pressures: tuple[float, ...]) -> Iterator[OringResult]:
     """Results of a case at increasing pressures [Pa, gauge], each yielded when it is computed.
 
-    Raises:
-        ValueError: The pressures are invalid, or the ring does not fit or does not seal.
-        NotConvergedError: Newton's method did not converge.
+    ValueError: the pressures are invalid, or the ring does not fit or does not seal; NotConvergedError: Newton's method
+    did not converge.
     """
     model = oring_model(case)
     for loaded in loaded_states(case, model, pressures):
@@ -95,15 +86,15 @@ def oring_results(case: OringCase, pressures: tuple[float, ...]) -> Iterator[Ori
 def evaluate_contact(model: OringModel, loaded: LoadedRing) -> OringResult:
     """Contact, forces and shape of an equilibrium."""
     position = outline(model, loaded.state)
-    pressure = surface_pressure(loaded.surroundings, position)
-    axial = _axial_force(pressure, node_areas(position)[:, 1], _upstream(loaded, position))
+    pressure = walls.surface_pressure(loaded.surroundings, position)
+    axial = _axial_force(pressure, walls.node_areas(position)[:, 1], _upstream(loaded, position))
     gradient = deformation_gradient(model.elements, loaded.state.displacement)
     volumes = model.elements.weights.sum(axis=1)
     ratios = volume_ratios(model.elements, gradient)
     mean_tension = (loaded.state.tension * volumes).sum() / volumes.sum()
     nodes = model.mesh.nodes + loaded.state.displacement.reshape(-1, 2)
     von_mises = von_mises_stress(model.rubber, gradient).mean(axis=1)
-    rod, gland, wall = (_contact(loaded, position, which) for which in (ROD, GLAND, WALL))
+    rod, gland, wall = (_contact(loaded, position, which) for which in (walls.ROD, walls.GLAND, walls.WALL))
     return OringResult(
         pressure=loaded.pressure,
         rod=rod,
@@ -117,32 +108,30 @@ def evaluate_contact(model: OringModel, loaded: LoadedRing) -> OringResult:
     )
 
 
-def _axial_force(pressure: SurfacePressure, axial_areas: FloatArray, upstream: BoolArray) -> float:
+def _axial_force(pressure: walls.SurfacePressure, axial_areas: FloatArray, upstream: BoolArray) -> float:
     """Axial force on the downstream side, corrected for tilted facets at rod and gland upstream [N].
 
     Rod and gland carry no axial load. The facets at the upstream edges of their contacts are not exactly parallel to
     the axis: a discretisation error.
     """
     axial = pressure.total * axial_areas
-    tilted = (pressure.shares[:, 1 + ROD] + pressure.shares[:, 1 + GLAND]) * axial
+    tilted = (pressure.shares[:, 1 + walls.ROD] + pressure.shares[:, 1 + walls.GLAND]) * axial
     return float(axial[~upstream].sum() + tilted[upstream].sum())
 
 
 def _upstream(loaded: LoadedRing, position: FloatArray) -> BoolArray:
     """Nodes on the fluid side; without pressure, the upstream half (z < 0)."""
-    if loaded.pressure > 0.0:
-        return loaded.surroundings.wetted
-    return position[:, 1] < 0.0
+    return loaded.surroundings.wetted if loaded.pressure > 0.0 else position[:, 1] < 0.0
 
 
 def _contact(loaded: LoadedRing, position: FloatArray, wall: int) -> WallContact:
     surroundings = loaded.surroundings
-    stresses = wall_stresses(surroundings, position)
+    stresses = walls.wall_stresses(surroundings, position)
     near = (stresses.argmax(axis=1) == wall) & (stresses[:, wall] > -_TOUCHING * surroundings.transition)
-    areas = np.linalg.norm(node_areas(position), axis=1)
-    stress = surface_pressure(surroundings, position).contact_stress
+    areas = np.linalg.norm(walls.node_areas(position), axis=1)
+    stress = walls.surface_pressure(surroundings, position).contact_stress
     force = float((stress * areas)[near].sum())
-    along = position[:, 0] if wall == WALL else position[:, 1]
+    along = position[:, 0] if wall == walls.WALL else position[:, 1]
     fluid = np.where(surroundings.wetted, surroundings.pressure, 0.0)
     inside = near & (stresses[:, wall] > fluid)
     wall_force = float((stresses[:, wall] * areas)[inside].sum())

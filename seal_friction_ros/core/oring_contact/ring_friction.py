@@ -68,16 +68,9 @@ def friction_of_contact(law: RingLaw, contact: WallContact) -> float:
 def friction_law(
     law: RingLaw, geometry: SealGeometry, pressures: Sequence[float], contacts: Sequence[WallContact]
 ) -> FrictionLaw:
-    """Friction of a ring over pressure, for a seal file.
+    """Friction of a ring over pressure, for a seal file, by its contacts on the sliding wall at pressures [Pa, gauge].
 
-    Args:
-        law: Of its rubber, wall and lubricant.
-        geometry: Of the ring.
-        pressures: Computed pressures [Pa, gauge], two at least, increasing.
-        contacts: Contact on the sliding wall at each.
-
-    Raises:
-        ValueError: Fewer than two pressures, or a friction that falls with pressure.
+    ValueError: fewer than two pressures, or a friction that falls with pressure.
     """
     at = tuple(pressures)
     if isinstance(law, ShearLaw):
@@ -89,10 +82,8 @@ def friction_law(
 def friction_after(seal: Seal) -> SealFriction:
     """Friction of another ring of the same rubber, wall and lubricant as ``seal``, without a reading of it.
 
-    Breakaway stays the same share of the sliding friction, in the mean over the pressures of the seal.
-
-    Raises:
-        ValueError: The seal has another law than `ContactShear`.
+    Breakaway stays the same share of the sliding friction, in the mean over the pressures of the seal. ValueError: the
+    seal has another law than `ContactShear`.
     """
     law = seal.coulomb_law
     if not isinstance(law, ContactShear):
@@ -111,7 +102,8 @@ def fit_shear_law(
 ) -> FittedShear:
     r"""Shear law of a ring from readings of its friction F_i at the pressures P_i.
 
-    c is the geometric mean of :math:`F_i / A_n(P_i)`. The exponent minimises
+    c is the geometric mean of :math:`F_i / A_n(P_i)`, by the contacts on the sliding wall at the computed pressures
+    [Pa, gauge]. The exponent minimises
 
     .. math::
         \sum_i \frac{(\ln F_i - \ln c A_n(P_i))^2}{s_0^2} + \frac{(n - n_0)^2}{s_n^2}
@@ -122,16 +114,8 @@ def fit_shear_law(
     .. math::
         s^2 = \frac{k s_0^2 + \sum_i (\ln F_i - \ln c A_n(P_i))^2}{k + N - 1}
 
-    so one reading leaves s_0. The speed is not in the law. All this is our choice.
-
-    Args:
-        prior: Its exponent is n_0.
-        pressures: Computed pressures [Pa, gauge], two at least.
-        contacts: Contact on the sliding wall at each.
-        readings: One at least.
-
-    Raises:
-        ValueError: A reading is at a pressure that was not computed, or its friction is not positive.
+    so one reading leaves s_0. The speed is not in the law. All this is our choice. ValueError: a reading is at a
+    pressure that was not computed, or its friction is not positive.
     """
     at = np.array([reading.pressure for reading in readings])
     friction = np.array([reading.friction for reading in readings])

@@ -92,15 +92,9 @@ def run_closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: F
 
     The feed-forward does not fade in. With an encoder, position and velocity of the controller and velocity of the
     estimator are those of its counts, the velocity over `ENCODER_WINDOW` samples, and the controller has the measured
-    pressures; otherwise the controller measures without error.
-
-    Args:
-        axis: Servo, estimator and feed-forward.
-        wave: Reference.
-        samples: Number of samples.
-        delay: Time from a velocity sample until its feed-forward is in the controller [s], >= 0.
-        noise: Errors of the sensors of the estimator, repeated after the last row; shape (k, 4), columns chamber a
-            [Pa], chamber b [Pa], force sum [N], velocity [m/s]. None: no errors.
+    pressures; otherwise the controller measures without error. The ``delay`` [s, >= 0] is from a velocity sample until
+    its feed-forward is in the controller. The ``noise`` of the sensors of the estimator repeats after its last row;
+    shape (k, 4), columns chamber a [Pa], chamber b [Pa], force sum [N], velocity [m/s].
     """
     plant, parameters, sensors = axis
     counts: deque[float] = deque(maxlen=ENCODER_WINDOW + 1)

@@ -39,18 +39,12 @@ from seal_friction_ros.core.servo.pneumatics import (
 class Limited(IntFlag):
     """Fault or limit of a reference, a feed-forward or a command; 0: none."""
 
-    REFERENCE_NOT_FINITE = 1
-    """the last good position is held"""
-    REFERENCE_OUT_OF_STROKE = 2
-    """clamped short of the stops"""
-    REFERENCE_TOO_FAST = 4
-    """position follows at the largest speed; velocity or acceleration clamped"""
-    FEEDFORWARD_NOT_FINITE = 8
-    """counts as 0 N"""
-    FORCE = 16
-    """force command clamped to the force of the supply pressure"""
-    SPOOL = 32
-    """spool command clamped to full opening"""
+    REFERENCE_NOT_FINITE = 1  # the last good position is held
+    REFERENCE_OUT_OF_STROKE = 2  # clamped short of the stops
+    REFERENCE_TOO_FAST = 4  # position follows at the largest speed; velocity or acceleration clamped
+    FEEDFORWARD_NOT_FINITE = 8  # counts as 0 N
+    FORCE = 16  # force command clamped to the force of the supply pressure
+    SPOOL = 32  # spool command clamped to full opening
 
 
 @dataclass(frozen=True)
@@ -240,18 +234,9 @@ valve_opening = chosen_by_type({ServoValve: oil_opening, PneumaticValve: air_ope
 def control(
     g: Gains, c: Constants, state: ControllerState, measured: Measurement, reference: Setpoint, feedforward: float
 ) -> tuple[ControllerState, Command]:
-    """One sample of the controller.
+    """One sample of the controller with the model of valve, cylinder and load ``c``; the next state and the command.
 
-    Args:
-        g: Gains.
-        c: Model of valve, cylinder and load.
-        state: State after the previous sample.
-        measured: Position, velocity and pressures, all finite.
-        reference: Setpoint; any number, also not finite.
-        feedforward: Friction feed-forward [N], positive on extension; any number, also not finite.
-
-    Returns:
-        The next state and the spool command.
+    ``measured`` is finite; the reference and the ``feedforward`` [N], positive on extension, may be any number.
     """
     load, k = c.load, g.controller
     setpoint, limited = limit_reference(g, state.reference, reference)

@@ -43,9 +43,8 @@ class Cylinder(CheckedParameters):
         super().__post_init__()
         if self.type not in CYLINDER_TYPES:
             raise ValueError(f'Cylinder.type = {self.type!r} is none of {", ".join(CYLINDER_TYPES)}')
-        bore, rod, swept = self.bore_diameter, self.rod_diameter, self.area_a * self.stroke
-        if bore <= rod:
-            raise ValueError(f'Cylinder.bore_diameter = {bore} m is not above rod_diameter = {rod} m')
+        self.check_order('bore_diameter', 'rod_diameter')
+        swept = self.area_a * self.stroke
         if self.dead_volume < 0.01 * swept:
             what = f'{self.dead_volume} m3 is below 1 % of the swept volume {swept:.3g} m3'
             raise ValueError(f'Cylinder.dead_volume = {what}: a chamber without volume is infinitely stiff')

@@ -40,8 +40,7 @@ class ElasticSeals(CheckedParameters):
     """Elasticity of the seals of a simulated servo."""
 
     first: Presliding
-    second: Presliding | None = None
-    """of the rest of the friction; None: the first group has all of it"""
+    second: Presliding | None = None  # of the rest of the friction; None: the first group has all of it
     first_share: float = parameter(
         1.0, unit='1', lower=0.0, upper=1.0, description='Share of the first group in the friction; 1 without second.'
     )

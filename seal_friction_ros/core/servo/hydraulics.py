@@ -39,9 +39,7 @@ class ServoValve(CheckedParameters):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.supply_pressure < self.return_pressure:
-            limit = f'return_pressure = {self.return_pressure} Pa'
-            raise ValueError(f'ServoValve.supply_pressure = {self.supply_pressure} Pa is below {limit}')
+        self.check_order('supply_pressure', 'return_pressure', may_be_equal=True)
 
     @property
     def orifice_gain(self) -> float:

@@ -162,13 +162,11 @@ class RoundedWave:
     def at(self, time: float) -> Setpoint:
         """Set point i with t_i = i T nearest to ``time`` [s]."""
         i = round(time / self.period)
-        newest, last, before = (self._steps((i - back) * self.period) for back in range(3))
+        positions = (self.wave.at((i - back) * self.period).position for back in range(3))
+        newest, last, before = (round(position / self.resolution) for position in positions)
         speed = self.resolution / self.period  # of one step a sample
         acceleration = speed / self.period * (newest - 2 * last + before)
         return Setpoint(self.resolution * newest, speed * (newest - last), acceleration)
-
-    def _steps(self, time: float) -> int:
-        return round(self.wave.at(time).position / self.resolution)
 
 
 class PullCommand(NamedTuple):

@@ -48,8 +48,7 @@ from seal_friction_ros.core.servo.pneumatics import (
     air_rates,
 )
 
-Valve = ServoValve | PneumaticValve
-"""The valve of a plant. Its type says what the fluid is: oil or air."""
+Valve = ServoValve | PneumaticValve  # The valve of a plant. Its type says what the fluid is: oil or air.
 
 CREEP_SPEED = 1e-9  # [m/s] a rod that slides slower than this and decelerates is at rest
 MAX_EVENTS = 16  # in one inner step; then the rod is held until its end

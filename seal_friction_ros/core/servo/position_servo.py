@@ -52,9 +52,8 @@ LARGEST_RATE_TIMES_STEP = 2.5  # [-] the stability limit of Runge-Kutta of fourt
 class ServoParameters(CheckedParameters):
     """Parameters of the servo; without seals it has no seal friction.
 
-    Raises:
-        ValueError: A value is out of bounds, the inner step does not divide the sample time or is too long for the
-            fastest part of the plant, or the closed loop is unstable.
+    ValueError: a value is out of bounds, the inner step does not divide the sample time or is too long for the fastest
+    part of the plant, or the closed loop is unstable.
     """
 
     valve: Valve = field(default_factory=ServoValve)  # its type says what the fluid is
@@ -216,13 +215,21 @@ def outputs(
 
 
 @compiled
+def _step_measured(
+    kept: Any, state: ServoState, measured: Measurement, reference: Setpoint, feedforward: float, load_force: float
+) -> tuple[ServoState, ServoOutputs]:
+    c, g, time, steps, elastic = kept.value
+    controller, command = control(g, c, state.controller, measured, reference, feedforward)
+    plant, shear = _advance_elastic(c, elastic, (time, steps), state.plant, state.seals, (command.spool, load_force))
+    return ServoState(plant, controller, shear), _outputs(kept, plant, shear, command, load_force)
+
+
+@compiled
 def _step(
     kept: Any, state: ServoState, reference: Setpoint, feedforward: float, load_force: float
 ) -> tuple[ServoState, ServoOutputs]:
-    c, g, time, steps, elastic = kept.value
-    controller, command = control(g, c, state.controller, measure(c, state.plant), reference, feedforward)
-    plant, shear = _advance_elastic(c, elastic, (time, steps), state.plant, state.seals, (command.spool, load_force))
-    return ServoState(plant, controller, shear), _outputs(kept, plant, shear, command, load_force)
+    measured = measure(kept.value[0], state.plant)
+    return _step_measured(kept, state, measured, reference, feedforward, load_force)
 
 
 def step(
@@ -234,31 +241,18 @@ def step(
 ) -> tuple[ServoState, ServoOutputs]:
     """One sample: the controller measures the rod without error, then the plant advances to the next sample.
 
-    Args:
-        parameters: The servo.
-        state: From `init` or the previous step.
-        reference: Setpoint; an invalid one is limited and flagged in ``outputs.command.limited``.
-        feedforward: Friction feed-forward [N], positive on extension; likewise.
-        load_force: Force from outside on the rod [N], positive on extension, constant over the step.
+    The state is from `init` or the previous step. An invalid reference or ``feedforward`` [N], positive on extension,
+    is limited and flagged in ``outputs.command.limited``. The ``load_force`` from outside on the rod [N], positive on
+    extension, is constant over the step.
     """
     return _step(parameters.kept, state, reference, feedforward, load_force)
-
-
-@compiled
-def _step_measured(
-    kept: Any, state: ServoState, measured: Measurement, reference: Setpoint, feedforward: float
-) -> tuple[ServoState, ServoOutputs]:
-    c, g, time, steps, elastic = kept.value
-    controller, command = control(g, c, state.controller, measured, reference, feedforward)
-    plant, shear = _advance_elastic(c, elastic, (time, steps), state.plant, state.seals, (command.spool, 0.0))
-    return ServoState(plant, controller, shear), _outputs(kept, plant, shear, command, 0.0)
 
 
 def step_measured(
     parameters: ServoParameters, state: ServoState, measured: Measurement, reference: Setpoint, feedforward: float = 0.0
 ) -> tuple[ServoState, ServoOutputs]:
     """As `step`, but the controller has the measurement of real sensors."""
-    return _step_measured(parameters.kept, state, measured, reference, feedforward)
+    return _step_measured(parameters.kept, state, measured, reference, feedforward, 0.0)
 
 
 class Trajectory(NamedTuple):
@@ -294,15 +288,7 @@ def simulate(
     feedforward: float | FloatArray = 0.0,
     load_force: float | FloatArray = 0.0,
 ) -> tuple[ServoState, Trajectory]:
-    """One `step` for each reference, in one compiled loop.
-
-    Args:
-        parameters: The servo.
-        state: From `init` or the previous step.
-        references: Setpoints of the n steps.
-        feedforward: Friction feed-forward [N], scalar or shape (n,).
-        load_force: Force from outside on the rod [N], scalar or shape (n,).
-    """
+    """One `step` for each of n references, in one compiled loop; both forces [N] are scalar or of shape (n,)."""
     setpoints = np.array([*references], dtype=float).reshape(-1, 3)
     inputs = np.empty((len(setpoints), 5))
     inputs[:, :3], inputs[:, 3], inputs[:, 4] = setpoints, feedforward, load_force

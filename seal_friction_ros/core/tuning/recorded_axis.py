@@ -199,15 +199,10 @@ def residual(law: RecordedLaw, reversal: BoolArray, force: FloatArray) -> Residu
 def tune_recorded_axis(
     recording: Recording, settings: FeedForwardSettings, axis: RecordedAxisSettings
 ) -> RecordedTuning:
-    """Parameters of the feed-forward from a recording.
+    """Parameters of the feed-forward from a recording, and what is known of its axis, with errors of model and delay.
 
-    Args:
-        recording: Motion of the axis.
-        settings: Settings before the tuning; those that the recording does not identify are unchanged.
-        axis: Known properties of the axis, and the errors of model and delay.
-
-    Raises:
-        ValueError: The recording lacks something; the message says what to record.
+    Of the ``settings``, those that the recording does not identify are unchanged. ValueError: the recording lacks
+    something; the message says what to record.
     """
     time = recording.time
     reversal = near_reversals(time, recording.reference_velocity)

@@ -19,22 +19,7 @@ from seal_friction_ros.core.machine.machine_snapshot import MachineSnapshot, mac
 from seal_friction_ros.core.messages import coder, layouts
 from seal_friction_ros.core.messages.blocks import Messages
 from seal_friction_ros.core.messages.together import decode_together
-from seal_friction_ros.offline.bags.bag import (
-    CONFIGURATION_TOPIC,
-    ESTIMATE_TOPIC,
-    FEEDFORWARD_TOPIC,
-    STATE_NAME,
-    TEMPERATURE_TOPIC,
-    BagError,
-    BagMessage,
-    KindOf,
-    TopicInfo,
-    bag_topics,
-    gathered,
-    named,
-    read_definitions,
-    read_messages,
-)
+from seal_friction_ros.offline.bags import bag as rosbag
 from seal_friction_ros.offline.bags.mapped_bag import (
     LAST_PART,
     MappingFile,
@@ -47,7 +32,7 @@ from seal_friction_ros.offline.bags.mapped_bag import (
 
 _OWN = {layouts.ESTIMATE_TYPE: 'estimate', layouts.FEEDFORWARD_TYPE: 'feedforward', layouts.TICK_TYPE: 'tick'}
 """Message type that the node of a machine makes for each actuator -> field of `Topics`."""
-ANSWER_TOPICS = {layouts.ESTIMATE_TYPE: ESTIMATE_TOPIC, layouts.FEEDFORWARD_TYPE: FEEDFORWARD_TOPIC}
+ANSWER_TOPICS = {layouts.ESTIMATE_TYPE: rosbag.ESTIMATE_TOPIC, layouts.FEEDFORWARD_TYPE: rosbag.FEEDFORWARD_TOPIC}
 """Message type of an answer -> topic, if the bag has no topic of that type."""
 
 RECORDED = '_recorded'
@@ -83,35 +68,29 @@ class Topics(NamedTuple):
     @property
     def state(self) -> str:
         """Topic of the states amid the bag, if there are any."""
-        return f'{(self.configuration or CONFIGURATION_TOPIC).rpartition("/")[0]}/{STATE_NAME}'
+        return f'{(self.configuration or rosbag.CONFIGURATION_TOPIC).rpartition("/")[0]}/{rosbag.STATE_NAME}'
 
 
-TYPES = Topics(*(getattr(layouts, f'{name.upper()}_TYPE') for name in Topics._fields))
-"""Message type of each topic."""
+TYPES = Topics(*(getattr(layouts, f'{name.upper()}_TYPE') for name in Topics._fields))  # Message type of each topic.
 
 
-def find_topics(bag: Path, namespace: str = '', infos: Mapping[str, TopicInfo] | None = None) -> Topics:
+def find_topics(bag: Path, namespace: str = '', infos: Mapping[str, rosbag.TopicInfo] | None = None) -> Topics:
     """The estimator's topics in a bag, found by message type, so that names and remapping do not matter.
 
-    Args:
-        bag: The bag.
-        namespace: Use only topics below it; for bags of several actuators.
-        infos: Topics of the bag, if they are known.
-
-    Raises:
-        BagError: There is no velocity topic, or a type of this project has several topics.
+    Only topics below the ``namespace`` count, in bags of several actuators. BagError: there is no velocity topic, or a
+    type of this project has several topics.
     """
-    known = bag_topics(bag) if infos is None else infos
+    known = rosbag.bag_topics(bag) if infos is None else infos
     result = Topics(*(find_topic(bag, wanted, namespace, known) for wanted in TYPES))
     if not result.velocity:
-        raise BagError(
+        raise rosbag.BagError(
             f'{bag}: no message of {TYPES.velocity} in it, so nothing to estimate from: a bag of another machine needs '
             'its mapping file (--mapping, or seal_friction import bag)'
         )
     return result
 
 
-def find_topic(bag: Path, wanted: str, namespace: str, known: Mapping[str, TopicInfo]) -> str:
+def find_topic(bag: Path, wanted: str, namespace: str, known: Mapping[str, rosbag.TopicInfo]) -> str:
     """The topic of a message type, empty if there is none; raises as `find_topics`."""
     below = f'/{namespace.strip("/")}/'.replace('//', '/')
     found = [
@@ -121,9 +100,9 @@ def find_topic(bag: Path, wanted: str, namespace: str, known: Mapping[str, Topic
         if topic.startswith(below) or wanted == TYPES.clock  # simulated time is one for all
     ]
     if len(found) > 1 and wanted == TYPES.temperature:  # a standard type: others may be of a motor or a battery
-        found = [topic for topic in found if topic.endswith(TEMPERATURE_TOPIC)]
+        found = [topic for topic in found if topic.endswith(rosbag.TEMPERATURE_TOPIC)]
     if len(found) > 1:
-        raise BagError(f'{bag}: several topics of {wanted}: {", ".join(found)}: choose with --namespace')
+        raise rosbag.BagError(f'{bag}: several topics of {wanted}: {", ".join(found)}: choose with --namespace')
     return found[0] if found else ''
 
 
@@ -132,7 +111,7 @@ class ActuatorBag(NamedTuple):
 
     path: Path
     topics: Topics
-    infos: Mapping[str, TopicInfo]  # topics of the bag, as they are
+    infos: Mapping[str, rosbag.TopicInfo]  # topics of the bag, as they are
     actuator: str = ''  # of a machine; empty: the bag has the messages of one actuator
     several: bool = False  # whether the machine has other actuators
     mapping: MappingFile | None = None  # of a bag without configuration
@@ -144,50 +123,41 @@ class ActuatorBag(NamedTuple):
         return f'{name} {self.actuator}' if self.several else name
 
     @property
-    def used(self) -> Mapping[str, TopicInfo]:
+    def used(self) -> Mapping[str, rosbag.TopicInfo]:
         """Topics of the actuator among its messages; their numbers are not known."""
-        return {topic: TopicInfo(kind, 1) for topic, kind in zip(self.topics, TYPES, strict=True) if topic}
+        return {topic: rosbag.TopicInfo(kind, 1) for topic, kind in zip(self.topics, TYPES, strict=True) if topic}
 
     @property
     def total(self) -> int:
         """Number of messages in the bag."""
         return sum(info.message_count for info in self.infos.values())
 
-    def messages(self, *, with_answers: bool = False) -> Iterator[BagMessage]:
-        """Messages in order of log time; BagError where the bag is damaged.
-
-        Args:
-            with_answers: Whether to estimate, too, if the bag has a mapping file and so no estimates.
-        """
+    def messages(self, *, with_answers: bool = False) -> Iterator[rosbag.BagMessage]:
+        """Messages in order of log time, with estimates by a mapping file if wanted; BagError where it is damaged."""
         if not self.actuator:
-            return read_messages(self.path)
+            return rosbag.read_messages(self.path)
         return _OfActuator(self).messages(machine_messages(self.path, self.mapping, with_answers=with_answers))
 
-    def blocks(self, kind_of: KindOf) -> Iterator[Messages]:
+    def blocks(self, kind_of: rosbag.KindOf) -> Iterator[Messages]:
         """Messages in blocks, by the compiler, which reads bags of this project many times faster.
 
         Raises as `block_reader.read_in_bulk`, and UnsuitedError.
         """
         if self.actuator:
-            return gathered(self.messages(), kind_of)
+            return rosbag.gathered(self.messages(), kind_of)
         from seal_friction_ros.offline.bags.block_reader import read_in_bulk  # noqa: PLC0415  loads the compiler
 
         return read_in_bulk(self.path, kind_of)
 
 
 def open_actuator(bag: Path, namespace: str = '', mapping: MappingFile | None = None) -> ActuatorBag:
-    """Find an actuator in a bag.
+    """Find an actuator in a bag of ``friction_estimator``, ``machine_estimator``, or with a mapping file in any rosbag.
 
-    Args:
-        bag: Of ``friction_estimator``, of ``machine_estimator``, or with a mapping file any rosbag.
-        namespace: Use only topics below it; of a machine the name of the actuator.
-        mapping: Mapping file of the machine.
-
-    Raises:
-        BagError: The bag cannot be read, it has no velocity, or there are several actuators and none is named.
-        ValueError: The mapping does not fit the bag.
+    Only topics below the ``namespace`` count; of a machine it is the name of the actuator. BagError: the bag cannot be
+    read, it has no velocity, or there are several actuators and none is named; ValueError: the mapping does not fit the
+    bag.
     """
-    infos = bag_topics(bag)
+    infos = rosbag.bag_topics(bag)
     if mapping is not None and is_for(mapping, infos):
         names = [one.name for one in mapping.file.actuators]
         mapping = mapping.only(_chosen(bag, names, namespace))
@@ -199,7 +169,9 @@ def open_actuator(bag: Path, namespace: str = '', mapping: MappingFile | None = 
     return ActuatorBag(bag, find_topics(bag, namespace, infos), infos)
 
 
-def actuator_of(bag: Path, infos: Mapping[str, TopicInfo], snapshot: MachineSnapshot, namespace: str) -> ActuatorBag:
+def actuator_of(
+    bag: Path, infos: Mapping[str, rosbag.TopicInfo], snapshot: MachineSnapshot, namespace: str
+) -> ActuatorBag:
     """An actuator of a bag of ``machine_estimator``; arguments and errors as of `open_actuator`."""
     machine, _ = _machine_of(bag, snapshot)
     actuators = {one.name: one for one in machine.actuators}
@@ -209,44 +181,43 @@ def actuator_of(bag: Path, infos: Mapping[str, TopicInfo], snapshot: MachineSnap
 def _opened(
     actuator: MachineActuator,
     bag: Path,
-    infos: Mapping[str, TopicInfo],
+    infos: Mapping[str, rosbag.TopicInfo],
     count: int,
     mapping: MappingFile | None = None,
 ) -> ActuatorBag:
-    """One of ``count`` actuators."""
     topics = _topics_of(actuator, infos, has_mapping=mapping is not None)
     if not topics.velocity:
-        raise BagError(no_velocity(bag, actuator.name))
+        raise rosbag.BagError(no_velocity(bag, actuator.name))
     return ActuatorBag(bag, topics, infos, actuator.name, count > 1, mapping)
 
 
-def recorded_machine(bag: Path, infos: Mapping[str, TopicInfo]) -> MachineSnapshot | None:
+def recorded_machine(bag: Path, infos: Mapping[str, rosbag.TopicInfo]) -> MachineSnapshot | None:
     """Machine whose ``machine_estimator`` recorded a bag; None: another bag. Raises BagError if it cannot be read."""
     present = {info.type_name for info in infos.values() if info.message_count}
     if layouts.CONFIGURATION_TYPE not in present:
         return None
     try:
-        first = first_snapshot(bag, read_messages(bag))
-    except BagError:
+        first = first_snapshot(bag, rosbag.read_messages(bag))
+    except rosbag.BagError:
         if layouts.VELOCITY_TYPE in present:  # a bag with a configuration that cannot be read is still worth a report
             return None
         raise
     return None if first is None or first.file.document is None else first
 
 
-def first_snapshot(bag: Path, messages: Iterable[BagMessage], topic: str = '') -> MachineSnapshot | None:
+def first_snapshot(bag: Path, messages: Iterable[rosbag.BagMessage], topic: str = '') -> MachineSnapshot | None:
     """Snapshot in the first configuration, on a topic if one is given; None without one; BagError if it is none."""
     found = (one for one in messages if one.type_name == layouts.CONFIGURATION_TYPE and topic in ('', one.topic))
     first = next(found, None)
     if first is None:
         return None
-    with named(bag, first):
+    with rosbag.named(bag, first):
         return parse_machine_text(coder.decode_text(first.data))
 
 
 def _machine_of(bag: Path, snapshot: MachineSnapshot) -> tuple[Machine, MachineState]:
-    with named_errors(bag, raised=BagError):
-        return machine_of(snapshot, read_definitions(bag, snapshot.file.topics.values()))
+    with named_errors(bag, raised=rosbag.BagError):
+        return machine_of(snapshot, rosbag.read_definitions(bag, snapshot.file.topics.values()))
 
 
 def _chosen(bag: Path, names: Sequence[str], namespace: str) -> str:
@@ -257,7 +228,7 @@ def _chosen(bag: Path, names: Sequence[str], namespace: str) -> str:
     if wanted in names:
         return wanted
     said = f'no actuator {wanted}: choose one' if wanted else 'several actuators: choose one'
-    raise BagError(f'{bag}: {said} with --namespace: {", ".join(names)}')
+    raise rosbag.BagError(f'{bag}: {said} with --namespace: {", ".join(names)}')
 
 
 def sources_of(actuator: MachineActuator) -> dict[str, tuple[str, ...]]:
@@ -273,7 +244,7 @@ def sources_of(actuator: MachineActuator) -> dict[str, tuple[str, ...]]:
     return {name: tuple(signals[one].topic for one in quantities) for name, quantities in parts.items() if quantities}
 
 
-def _topics_of(actuator: MachineActuator, infos: Mapping[str, TopicInfo], *, has_mapping: bool) -> Topics:
+def _topics_of(actuator: MachineActuator, infos: Mapping[str, rosbag.TopicInfo], *, has_mapping: bool) -> Topics:
     """Topics of an actuator, as its own messages have them."""
     present = {topic: info.type_name for topic, info in infos.items() if info.message_count}
     made = {name for name, needed in sources_of(actuator).items() if {*needed} <= present.keys()} | {'configuration'}
@@ -306,15 +277,15 @@ class _OfActuator:
         self._missing: Counter[str] = Counter()
         self._has_velocity = False
 
-    def messages(self, given: Iterable[BagMessage]) -> Iterator[BagMessage]:
+    def messages(self, given: Iterable[rosbag.BagMessage]) -> Iterator[rosbag.BagMessage]:
         """Messages of the actuator. Raises BagError if a message does not match its type, or there is no velocity."""
         for message in given:
-            with named(self._bag, message):
+            with rosbag.named(self._bag, message):
                 yield from self._taken(message)
         if not self._has_velocity:
-            raise BagError(no_velocity(self._bag, self._name, lacking(self._missing)))
+            raise rosbag.BagError(no_velocity(self._bag, self._name, lacking(self._missing)))
 
-    def _taken(self, message: BagMessage) -> Iterable[BagMessage]:
+    def _taken(self, message: rosbag.BagMessage) -> Iterable[rosbag.BagMessage]:
         kind, translation = message.type_name, self._translation
         if kind == layouts.CONFIGURATION_TYPE:
             return [self._configured(message)]
@@ -325,9 +296,7 @@ class _OfActuator:
             return self._encoded(message, made)
         if kind == layouts.MACHINE_TYPE:
             answers = decode_together(message.data)
-            return self._encoded(
-                message, [(record, frame_id) for name, record, frame_id in answers if name == self._name]
-            )
+            return self._encoded(message, [one[1:] for one in answers if one.actuator == self._name])
         if kind == layouts.CLOCK_TYPE:
             translation.follow(coder.decode_clock(message.data), message.log_time)
             return [message]
@@ -335,7 +304,7 @@ class _OfActuator:
             return [message._replace(topic=f'/{self._name}/{message.topic.rpartition("/")[2]}')]
         return [] if kind in coder.DECODERS else [message]
 
-    def _configured(self, message: BagMessage) -> BagMessage:
+    def _configured(self, message: rosbag.BagMessage) -> rosbag.BagMessage:
         """Take a configuration of the machine; that of the actuator."""
         known = parse_machine_text(coder.decode_text(message.data))
         if self._name not in known.actuators:
@@ -346,8 +315,7 @@ class _OfActuator:
             snapshot = snapshot._replace(recorded=Recorded(None))
         return message._replace(topic=self._topics.configuration, data=coder.encode_text(snapshot_text(snapshot)))
 
-    def _encoded(self, message: BagMessage, made: Iterable[tuple[Any, bytes]]) -> Iterator[BagMessage]:
-        """Records as messages of the actuator."""
+    def _encoded(self, message: rosbag.BagMessage, made: Iterable[tuple[Any, bytes]]) -> Iterator[rosbag.BagMessage]:
         for record, frame_id in made:
             kind = coder.type_of(record)
             self._has_velocity |= kind == layouts.VELOCITY_TYPE
@@ -368,27 +336,22 @@ class Source(NamedTuple):
     """Messages of a bag that are replayed: all of them, or those of one actuator."""
 
     path: Path
-    infos: Mapping[str, TopicInfo]
-    read: Callable[[], Iterator[BagMessage]]
+    infos: Mapping[str, rosbag.TopicInfo]
+    read: Callable[[], Iterator[rosbag.BagMessage]]
     configuration: str  # topic; empty if there is none
     first: MachineSnapshot | None  # in the first configuration
     own: Topics | None  # of the built-in mapping; None: the machine has a mapping file
 
 
 def source_of(bag: Path | ActuatorBag, namespace: str) -> Source:
-    """Messages to replay.
+    """Messages to replay, of a bag or an actuator of it; BagError: it cannot be read, or lacks what is needed.
 
-    Args:
-        bag: The bag, or one actuator of it.
-        namespace: Use only topics below it; the name of an actuator of a machine: that actuator alone.
-
-    Raises:
-        BagError: The bag cannot be read, or has not what the estimator needs.
+    Only topics below the ``namespace`` count; the name of an actuator of a machine means that actuator alone.
     """
-    infos: Mapping[str, TopicInfo]
-    read: Callable[[], Iterator[BagMessage]]
+    infos: Mapping[str, rosbag.TopicInfo]
+    read: Callable[[], Iterator[rosbag.BagMessage]]
     if isinstance(bag, Path):
-        path, infos, read = bag, bag_topics(bag), partial(read_messages, bag)
+        path, infos, read = bag, rosbag.bag_topics(bag), partial(rosbag.read_messages, bag)
         configuration = find_topic(bag, layouts.CONFIGURATION_TYPE, namespace, infos)
         machine = recorded_machine(bag, infos) if namespace and not configuration else None
         if machine is not None:

@@ -48,8 +48,7 @@ STATE_NAME = 'state'  # last part of the name of the topic of states, beside ``c
 STATE_TYPE = 'std_msgs/msg/String'  # laid out as a configuration, and not taken for one
 STATE_PERIOD = 60.0  # [s] of log time between two of them in a bag that is written here
 
-START_IN_NAME = re.compile(r'_[0-9]{8}_[0-9]{6}_[0-9]{6}\Z')
-"""Time of the start at the end of the name of a bag."""
+START_IN_NAME = re.compile(r'_[0-9]{8}_[0-9]{6}_[0-9]{6}\Z')  # Time of the start at the end of the name of a bag.
 
 LARGEST_METADATA = 1 << 20  # [bytes] of metadata.yaml, with some 5000 files or 1000 topics
 _FOLDER_MODE = 0o750  # of a bag, less what the umask of the process forbids
@@ -64,11 +63,6 @@ class BagError(ValueError):
     """A bag that cannot be read or written; one line that says which and why."""
 
 
-def message_error(bag: Path, message: BagMessage, error: ValueError) -> BagError:
-    """Error of a message, with its name."""
-    return BagError(f'{bag}: message on {message.topic} at {message.log_time} ns: {error}')
-
-
 @contextmanager
 def named(bag: Path, message: BagMessage) -> Iterator[None]:
     """Convert the error of a message to one that names it."""
@@ -77,7 +71,7 @@ def named(bag: Path, message: BagMessage) -> Iterator[None]:
     except BagError:
         raise
     except ValueError as error:
-        raise message_error(bag, message, error) from None
+        raise BagError(f'{bag}: message on {message.topic} at {message.log_time} ns: {error}') from None
 
 
 def timed_name(name: str) -> str:
@@ -102,16 +96,14 @@ class BagWriter:
     Log times are made strictly increasing, since readers sort by them: they return the messages in the order written.
     ``metadata.yaml`` exists from the start. It is updated after each finished file, for each new topic, and at the end.
 
-    As a context manager it removes the bag if the block fails, so that a failed command leaves no files.
+    As a context manager it removes the bag if the block fails, so that a failed command leaves no files. BagError:
+    there is something at ``path`` already, or it cannot be made.
 
     Args:
         path: Folder of the bag; must not exist.
         split_size: Largest size of a file, after which the next one begins [bytes]; 0: no limit.
         split_duration: Longest duration of a file, after which the next one begins [s]; 0: no limit.
         custom_data: For ``metadata.yaml``.
-
-    Raises:
-        BagError: There is something at ``path`` already, or it cannot be made.
     """
 
     def __init__(
@@ -159,18 +151,11 @@ class BagWriter:
         publish_time: int | None = None,
         description: Description | None = None,
     ) -> int:
-        """Append one serialised message; OSError if writing fails.
+        """Append one serialised message with a ``log_time`` [ns]; OSError if writing fails.
 
-        Args:
-            topic: Its topic.
-            type_name: Its type.
-            log_time: [ns]
-            data: Its bytes.
-            publish_time: [ns] on any clock; default: the recorded log time.
-            description: Of the topic; optional if the type is installed.
-
-        Returns:
-            The recorded log time [ns]: the one given, or 1 ns after the last one if that is later.
+        The ``publish_time`` [ns] is on any clock, by default the recorded log time. A topic whose type is installed
+        needs no ``description``. Returns the recorded log time [ns]: the one given, or 1 ns after the last one if that
+        is later.
         """
         key = (topic, type_name)
         if key not in self._descriptions:
@@ -362,8 +347,7 @@ def _qos(type_name: str) -> dict[str, Any]:
 def read_messages(path: Path) -> Iterator[BagMessage]:
     """Messages of a bag folder, or of a bare MCAP or SQLite file; file by file, each in order of log time.
 
-    Raises:
-        BagError: There is no bag, or it is damaged; raised when the damage is reached.
+    BagError: there is no bag, or it is damaged; raised when the damage is reached.
     """
     with _as_bag_errors(path):
         found = storage(path)
@@ -372,8 +356,7 @@ def read_messages(path: Path) -> Iterator[BagMessage]:
             yield message._replace(data=mcap_reader.unpack_zstd(message.data)) if is_packed else message
 
 
-KindOf = Callable[[str, str], int]
-"""Topic and message type -> kind of its messages, for example a `Kind`; below 255."""
+KindOf = Callable[[str, str], int]  # Topic and message type -> kind of its messages, for example a `Kind`; below 255.
 
 
 def gathered(messages: Iterable[BagMessage], kind_of: KindOf) -> Iterator[Messages]:
@@ -392,10 +375,8 @@ class Storage(NamedTuple):
     """Files of a bag and how to read them."""
 
     files: tuple[Path, ...]
-    reader: Any
-    """`mcap_reader` or `sqlite_reader`: `file_messages` and `file_channels` of a file"""
-    packed: str
-    """what is compressed by zstd: ``none``, each ``message`` or each ``file``"""
+    reader: Any  # `mcap_reader` or `sqlite_reader`: `file_messages` and `file_channels` of a file
+    packed: str  # what is compressed by zstd: ``none``, each ``message`` or each ``file``
 
     @property
     def is_plain_mcap(self) -> bool:
@@ -409,8 +390,7 @@ class Storage(NamedTuple):
                 yield from getattr(self.reader, function)(plain)
 
 
-_READERS = {'mcap': mcap_reader, 'sqlite3': sqlite_reader}
-"""Storage identifier of rosbag2 -> its reader."""
+_READERS = {'mcap': mcap_reader, 'sqlite3': sqlite_reader}  # Storage identifier of rosbag2 -> its reader.
 
 
 class TopicInfo(NamedTuple):
@@ -444,9 +424,7 @@ def read_definitions(path: Path, types: Iterable[str]) -> dict[str, Definition]:
     """Definition of each of some types (``package/Name``), of the bag if it has one.
 
     A bag holds them as MCAP schemas or in the table ``message_definitions`` of SQLite, which rosbag2 writes since Iron.
-
-    Raises:
-        BagError: The bag cannot be read, or a type is neither defined in it nor installed, nor one of ROS 2.
+    BagError: the bag cannot be read, or a type is neither defined in it nor installed, nor one of ROS 2.
     """
     wanted = dict.fromkeys(short_name(name) for name in types)
     texts: dict[str, str] = {}

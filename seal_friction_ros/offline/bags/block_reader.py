@@ -129,8 +129,8 @@ def _walk(
 ) -> tuple[int, int, int]:
     """Locate messages from an offset on, up to the end, the next schema, the next channel or an invalid record.
 
-    Returns:
-        Offset reached, number of messages, and opcode of the record there: 0 at the end, -1 if it is invalid.
+    Returns the offset reached, the number of messages, and the opcode of the record there: 0 at the end, -1: it is
+    invalid.
     """
     while offset + HEAD <= len(data):
         opcode, end = data[offset], offset + HEAD + integer_at(data, offset + 1, 8)

@@ -75,29 +75,21 @@ def collected(
     messages: Iterable[BagMessage] | None = None,
     bulk_from: int = BULK_FROM,
 ) -> _Collector:
-    """A new collector with all blocks of a bag.
+    """A new collector with all blocks of a bag, or of the ``messages`` given.
 
-    Args:
-        bag: The bag.
-        wanted: Name -> topic and type of the messages that the collector takes.
-        make: Makes an empty collector; an unusual bag takes a second one.
-        messages: Instead of those of the bag.
-        bulk_from: Smallest number of messages to read in bulk.
-
-    Raises:
-        BagError: The bag cannot be read, or a message is not of its type; names its topic and time.
+    ``wanted`` gives topic and type of what the collector takes, by name. ``make`` makes an empty collector; an unusual
+    bag takes a second one. From ``bulk_from`` messages on, the bag is read in bulk. BagError: the bag cannot be read,
+    or a message is not of its type; names its topic and time.
     """
     kinds = {one.topic: (kind, one.type_name) for kind, one in enumerate(wanted.values(), start=1) if one.topic}
 
     def kind_of(topic: str, type_name: str) -> int:
-        """Kind of the messages on a topic."""
         kind, known = kinds.get(topic, (0, type_name))
         if type_name != known:
             raise UnsuitedError(f'{topic} has messages of {known} and of {type_name}')
         return kind
 
     def fill(blocks: Iterable[Messages]) -> _Collector:
-        """Collector of all blocks."""
         collector = make()
         with progress(f'read {bag.path.name}', bag.total) as advance:
             for block in blocks:
@@ -166,7 +158,6 @@ class _VelocityCollector:
         self._configuration: Configuration | None = None
 
     def add(self, block: Block) -> None:
-        """Take one block."""
         for _, _, text in block.decoded('configuration', decode_text):
             self._configuration = parse_snapshot(text).configuration
         found = {name: block.of(name) for name in INPUTS}
@@ -175,7 +166,6 @@ class _VelocityCollector:
         extend(self._columns, self._held.at(found['velocity'].places, found))
 
     def rows(self) -> VelocityRows:
-        """All rows."""
         columns = np.array([np.frombuffer(column) for column in self._columns])
         stamps, received = (np.frombuffer(times, np.int64) for times in (self._stamps, self._received))
         return VelocityRows(stamps, received, columns, self._configuration)
@@ -195,13 +185,8 @@ def extend(columns: list['array[float]'], rows: FloatArray) -> None:
 def in_turn(stamps: IntArray, places: IntArray, is_answer: BoolArray) -> tuple[IntArray, IntArray, IntArray]:
     """Pairs of samples and answers of one stamp: each answer, if no other is between, with the newest sample.
 
-    Args:
-        stamps: Of samples and answers [ns], shape (n,).
-        places: In the bag, shape (n,).
-        is_answer: Which are answers, shape (n,).
-
-    Returns:
-        Numbers of the answers that have a sample, of these samples, and of the samples that still wait for an answer.
+    Stamps [ns] and places in the bag are those of samples and answers, shape (n,). Returns the numbers of the answers
+    that have a sample, of these samples, and of the samples that still wait for an answer.
     """
     order = np.lexsort((places, stamps))
     same = np.diff(stamps[order]) == 0

@@ -20,15 +20,8 @@ from seal_friction_ros.core.machine.machine import Machine, MachineActuator, Mac
 from seal_friction_ros.core.messages.coder import encode, encode_text, type_of
 from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, FORCE_TYPE, INPUTS, PRESSURE_TYPE, VELOCITY_TYPE
 from seal_friction_ros.core.messages.records import Input, Position, Pressure, ServoReference
+from seal_friction_ros.offline.bags import bag as rosbag
 from seal_friction_ros.offline.bags.actuator_bag import no_velocity, sources_of
-from seal_friction_ros.offline.bags.bag import (
-    CONFIGURATION_TOPIC,
-    BagError,
-    BagWriter,
-    bag_topics,
-    named,
-    read_messages,
-)
 from seal_friction_ros.offline.bags.mapped_bag import MappingFile, Translation, lacking, machine_in
 from seal_friction_ros.offline.work.progress import counted, progress
 
@@ -45,29 +38,23 @@ class ActuatorImport(NamedTuple):
 
 
 def convert_bag(bag: Path, out: Path, mapping: MappingFile, also: Collection[str] = ()) -> dict[str, ActuatorImport]:
-    """Convert a bag with standard messages.
+    """Convert a rosbag2 bag with standard messages to the bag ``out``, or to a folder with a bag for each actuator.
 
-    Args:
-        bag: Any rosbag2 bag, MCAP or SQLite.
-        out: Bag to write; with several actuators a folder with one bag each, by their names. Must not exist.
-        mapping: Mapping file of the machine.
-        also: Topics to copy as they are, for example the command of a controller.
-
-    Raises:
-        ValueError: The mapping does not fit the bag; one line that names file, actuator or topic. Nothing is written.
-        BagError: The bag cannot be read, or ``out`` exists or cannot be made.
+    Topics in ``also`` are copied as they are, for example the command of a controller. ValueError: the mapping does not
+    fit the bag; one line that names file, actuator or topic, and nothing is written; BagError: the bag cannot be read,
+    or ``out`` exists or cannot be made.
     """
     machine, state = machine_in(bag, mapping)
-    topics = bag_topics(bag)
+    topics = rosbag.bag_topics(bag)
     if absent := [topic for topic in also if topic not in topics]:
         raise ValueError(f'{bag}: {absent[0]} is not in it; it has {", ".join(sorted(topics))}')
     several = len(machine.actuators) > 1
     folders = {one.name: out / one.name if several else out for one in machine.actuators}
     if several and out.exists():
-        raise BagError(f'{out} exists already: not overwriting')
+        raise rosbag.BagError(f'{out} exists already: not overwriting')
     try:
         with ExitStack() as stack:
-            writers = [stack.enter_context(BagWriter(folder)) for folder in folders.values()]
+            writers = [stack.enter_context(rosbag.BagWriter(folder)) for folder in folders.values()]
             present = {topic: info.message_count for topic, info in topics.items() if info.message_count}
             counts, missing, lowest, tracks = _write(machine, state, bag, writers, present, also)
             for one, count in zip(machine.actuators, counts, strict=True):
@@ -94,7 +81,6 @@ class _Track:
         self._measured = array('d')
 
     def take(self, record: Input) -> None:
-        """Take one record."""
         if isinstance(record, ServoReference):
             self._wanted.extend((record.stamp, record.position))
         elif isinstance(record, Position):
@@ -115,16 +101,14 @@ def _write(
     machine: Machine,
     state: MachineState,
     bag: Path,
-    writers: list[BagWriter],
+    writers: list[rosbag.BagWriter],
     present: Mapping[str, int],
     also: Collection[str],
 ) -> tuple[list[Counter[str]], list[str], list[Lowest], list[_Track]]:
     """Write what each actuator gets, its velocity from the first pressure and force sum on.
 
-    A recorder hears its topics one after the other, so the first messages of some are missing.
-
-    Returns:
-        Number of messages by topic, what messages lacked, and of each actuator its lowest pressures and its tracking.
+    A recorder hears its topics one after the other, so the first messages of some are missing. Returns the number of
+    messages by topic, what messages lacked, and of each actuator its lowest pressures and its tracking.
     """
     lowest = [Lowest() for _ in machine.actuators]
     tracks = [_Track() for _ in machine.actuators]
@@ -135,14 +119,14 @@ def _write(
     translation = Translation(machine, state)
     with progress(f'import {bag.name}', sum(present.values())) as advance:
         used = {*machine.plans, *also}
-        for message in (one for one in counted(read_messages(bag), advance) if one.topic in used):
+        for message in (one for one in counted(rosbag.read_messages(bag), advance) if one.topic in used):
             if not writers[0].message_count:
                 _write_configurations(machine, state, writers, message.log_time)
             for writer in writers if message.topic in also else ():
                 writer.write(*message)
             if message.topic not in machine.plans:
                 continue
-            with named(bag, message):
+            with rosbag.named(bag, message):
                 for number, record, frame_id in translation.records(message._replace(publish_time=None), missing):
                     kind = type_of(record)
                     stamp = repairs.setdefault((number, kind), StampRepair()).next(record.stamp, message.log_time)
@@ -170,7 +154,9 @@ def _awaited(actuator: MachineActuator, present: Collection[str]) -> set[str]:
     return {kind for name, kind in kinds.items() if name in sources and {*sources[name]} <= {*present}}
 
 
-def _write_configurations(machine: Machine, state: MachineState, writers: list[BagWriter], log_time: int) -> None:
+def _write_configurations(
+    machine: Machine, state: MachineState, writers: list[rosbag.BagWriter], log_time: int
+) -> None:
     for actuator, known, writer in zip(machine.actuators, state.actuators, writers, strict=True):
         text = encode_text(snapshot_text(Snapshot(actuator.configuration, known.pipeline)))
-        writer.write(CONFIGURATION_TOPIC, CONFIGURATION_TYPE, log_time, text)
+        writer.write(rosbag.CONFIGURATION_TOPIC, CONFIGURATION_TYPE, log_time, text)

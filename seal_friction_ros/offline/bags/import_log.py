@@ -62,16 +62,10 @@ NO_TRACK = Track()
 
 
 def convert_log(log: Path, out: Path, rig: Rig) -> ImportSummary:
-    """Convert a measured log to a bag.
+    """Convert a measured log to the bag ``out``: one row per line, cells separated by commas, semicolons or blanks.
 
-    Args:
-        log: Text with one row per line, cells separated by commas, semicolons or white space; '#' begins a comment.
-        out: Bag to write; must not exist.
-        rig: Description of the columns.
-
-    Raises:
-        ValueError: The log cannot be read or is invalid; one line that names file and line. Nothing is written.
-        BagError: ``out`` exists already or cannot be made.
+    ValueError: the log cannot be read or is invalid; one line that names file and line, and nothing is written;
+    BagError: ``out`` exists already or cannot be made.
     """
     read = read_samples(log, rig)
     summary = write_samples(out, read.samples, rig.frame_id, read.track)

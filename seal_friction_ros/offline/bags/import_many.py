@@ -22,25 +22,13 @@ Convert = Callable[[Path, Path], tuple[dict[str, Any], str]]
 def import_many(
     convert: Convert, sources: Sequence[Place], out: Path, workers: Workers, kept: Kept = NOWHERE, settings: Any = None
 ) -> list[Outcome[Values]]:
-    """Convert every source, whatever becomes of the others.
+    """Convert every source, whatever becomes of the others; outcomes in their order, with ``numbers`` and ``text``.
 
     All bags appear together at the end, so that an interrupted command leaves none, except in a work folder: there each
-    is kept until the bags appear, also if some could not be made.
-
-    Args:
-        convert: Conversion of one source.
-        sources: Logs or bags: paths, or URLs that are copied where they are converted.
-        out: The bag of one source; of several a folder with a bag each, by `bag_names`. Must not exist.
-        workers: Sources at a time, or a cluster, whose workers write into the folder of ``out`` or the work folder.
-        kept: Where finished bags and errors are kept, by content and name of a source and by the settings.
-        settings: What the conversion depends on, as of `content_of`.
-
-    Returns:
-        Outcomes in the order of the sources; results have ``numbers`` and ``text``.
-
-    Raises:
-        ValueError: Two sources have one name, or the work folder or the cluster cannot be used.
-        BagError: ``out`` exists already, or cannot be made.
+    is kept until the bags appear, also if some could not be made. The workers of a cluster write into the folder of
+    ``out`` or the work folder. ``out`` is the bag of one source; of several a folder with a bag each, by `bag_names`.
+    The conversion depends on the ``settings``, as of `content_of`. ValueError: two sources have one name, or the work
+    folder or the cluster cannot be used; BagError: ``out`` exists already, or cannot be made.
     """
     names = bag_names(sources) if len(sources) > 1 else [out.name]
     if out.exists():

@@ -93,7 +93,6 @@ class _Stamps:
         self._malformed: Counter[str] = Counter()
 
     def add(self, message: BagMessage) -> None:
-        """Take one message."""
         topic, kind = message.topic, short_name(message.type_name)
         if topic not in self._readers:
             self._readers[topic], self._repairs[topic] = None, StampRepair()
@@ -109,7 +108,6 @@ class _Stamps:
             self._malformed[topic] += 1
 
     def found(self) -> dict[str, dict[str, int]]:
-        """What was found, of the topics with something."""
         return {
             topic: {
                 'jumps of the stamp': repair.jumps,

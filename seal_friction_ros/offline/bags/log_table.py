@@ -26,8 +26,7 @@ _HEAD = 1000  # lines in which header and first row are looked for
 _SHOWN = 40  # characters of an invalid cell in an error message
 _COMMA = re.compile(r'[-+]?\d*,\d+(?:[eE][-+]?\d+)?')
 
-Lines = Iterator[tuple[int, str]]
-"""Number and text of each line, without empty ones."""
+Lines = Iterator[tuple[int, str]]  # Number and text of each line, without empty ones.
 
 
 class Expected(NamedTuple):
@@ -77,15 +76,9 @@ class Table(NamedTuple):
 
 
 def read_table(log: Path, columns: Sequence[tuple[str, int, str]], rig: Expected) -> Table:
-    """Read columns of a log.
+    """Read columns of a log: place in the rig file, number and name of each; a name counts where it is not empty.
 
-    Args:
-        log: The file.
-        columns: Place in the rig file, number and name of each wanted column; a name counts where it is not empty.
-        rig: What the rig file says of the table.
-
-    Raises:
-        ValueError: The log cannot be read or lacks a column; one line that names file and field or line.
+    ValueError: the log cannot be read or lacks a column; one line that names file and field or line.
     """
     with _opened(log) as lines:
         return _read(log, lines, columns, rig)
@@ -160,7 +153,7 @@ def _rows(lines: Iterable[tuple[int, str]], layout: Layout, rig: Expected) -> Li
     rows = ((number, text) for number, text in lines if not text.startswith('#'))
     is_begun = rig.header != 'row' or rig.skip_rows > 0
     for number, text in rows:
-        is_begun = is_begun or share_of_numbers(split(text, layout.separator)) > 0.5
+        is_begun = is_begun or _share_of_numbers(split(text, layout.separator)) > 0.5
         if is_begun:
             yield number, text
 
@@ -172,14 +165,14 @@ def find_layout(head: Sequence[tuple[int, str]], rig: Expected, names: Sequence[
     has all of the ``names``.
     """
     plain = [place for place, (_, text) in enumerate(head) if not text.startswith('#')]
-    first = next((place for place in plain if _best(head[place][1])[0] > 0.5), plain[0] if plain else len(head))
+    first = next((place for place in plain if best(head[place][1])[0] > 0.5), plain[0] if plain else len(head))
     before, header = _header(head, first, rig, names)
     later = [head[place][1] for place in plain if place >= max(first, before)]
     separator = SEPARATORS.get(rig.separator)
     if rig.separator == 'auto' and later:
         marks = [mark for mark in SEPARATORS.values() if mark and mark in header and mark in later[0]]
         same = [m for m in marks if len(split(header, m)) == len(split(later[0], m))]
-        separator = same[0] if same else _best(later[0])[1]
+        separator = same[0] if same else best(later[0])[1]
     cells = [cell for text in later for cell in split(text, separator)] if separator != ',' or '"' in later[0] else []
     has_comma = any(map(_COMMA.fullmatch, cells)) and not any('.' in cell and is_number(cell) for cell in cells)
     if rig.decimal != 'auto':
@@ -212,11 +205,11 @@ def _separator_of(header: str, of_rows: str | None = None) -> str | None:
     return next((mark for mark in marks if mark in header), None)
 
 
-def _best(text: str) -> tuple[float, str | None]:
+def best(text: str) -> tuple[float, str | None]:
     """Largest share of numbers in a line, and the separator of cells that gives it."""
     found = [(split(text, mark), mark) for mark in SEPARATORS.values() if mark is None or mark in text]
-    cells, mark = max(found, key=lambda one: (share_of_numbers(one[0]), -len(one[0])))
-    return share_of_numbers(cells), mark
+    cells, mark = max(found, key=lambda one: (_share_of_numbers(one[0]), -len(one[0])))
+    return _share_of_numbers(cells), mark
 
 
 def split(text: str, separator: str | None) -> list[str]:
@@ -235,7 +228,7 @@ def is_number(cell: str) -> bool:
     return True
 
 
-def share_of_numbers(cells: Sequence[str]) -> float:
+def _share_of_numbers(cells: Sequence[str]) -> float:
     """Share of the cells with a content that are numbers."""
     filled = [cell for cell in cells if cell]
     return sum(map(is_number, filled)) / max(len(filled), 1)

@@ -250,8 +250,7 @@ class Located(NamedTuple):
     from 2^63 on is negative."""
 
 
-Locate = Callable[[bytes, Block, Names], Integers]
-"""`located`, or the same compiled."""
+Locate = Callable[[bytes, Block, Names], Integers]  # `located`, or the same compiled.
 
 
 def located(data: bytes, block: Block, names: Names, on_wrong_time: Callable[[int], None] | None = None) -> Integers:
@@ -283,8 +282,7 @@ def located(data: bytes, block: Block, names: Names, on_wrong_time: Callable[[in
     return np.frombuffer(found, np.int64).reshape(-1, 5).T
 
 
-OnFault = Callable[[Block, str], None]
-"""Called with each unreadable block and the reason."""
+OnFault = Callable[[Block, str], None]  # Called with each unreadable block and the reason.
 
 
 def messages(
@@ -307,16 +305,8 @@ def in_order(
 ) -> Iterator[Located]:
     """Messages of blocks in order of log time; equal times in the order of the file.
 
-    Args:
-        file: The file.
-        blocks: From its `Layout`.
-        names: Its channels.
-        locate: Finds the messages of a block.
-        at_once: Least size of the blocks that are read together [bytes].
-        on_fault: Without it, an unreadable block is an error.
-
-    Raises:
-        ValueError: A block cannot be read, or too many overlap in time.
+    Blocks are read together until they have ``at_once`` [bytes]. ``locate`` finds the messages of a block. Without
+    ``on_fault``, an unreadable block is an error. ValueError: a block cannot be read, or too many overlap in time.
     """
     if names.channels:  # else blocks stay in file order: channels are described before their messages
         blocks = sorted(blocks, key=lambda block: block.first)
@@ -341,7 +331,6 @@ def in_order(
 def _read(
     file: BinaryIO, blocks: Sequence[Block], names: Names, locate: Locate, on_fault: OnFault | None
 ) -> Iterator[Located]:
-    """Messages of each block."""
     for block in blocks:
         try:
             data = _unpacked(file, block)
@@ -359,7 +348,6 @@ def _alone(data: bytes, rows: Integers) -> Located:
 
 
 def _joined(parts: Sequence[Located]) -> Located:
-    """Messages of all parts."""
     starts = accumulate((len(part.data) for part in parts), initial=0)
     rows = [np.add(part.rows, [[0], [start], [0], [0], [0]]) for part, start in zip(parts, starts, strict=False)]
     return Located(b''.join(part.data for part in parts), np.concatenate([np.empty((5, 0), np.int64), *rows], axis=1))

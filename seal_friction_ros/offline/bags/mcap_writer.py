@@ -16,23 +16,9 @@ from pathlib import Path
 from typing import Any, NamedTuple, cast
 from zlib import crc32
 
+from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import (
-    Channel,
-    Chunk,
-    ChunkIndex,
-    DataEnd,
-    Footer,
-    Header,
-    McapRecord,
-    MessageIndex,
-    Metadata,
-    MetadataIndex,
-    Schema,
-    Statistics,
-    SummaryOffset,
-)
 from mcap.writer import MCAP0_MAGIC
 
 from seal_friction_ros.core.messages.cdr import ENCODING
@@ -73,12 +59,10 @@ class _Chunk:
 
     def __init__(self) -> None:
         self.data = bytearray()
-        self.first_time = self.last_time = 0
-        """log times of the first and the last message [ns]"""
+        self.first_time = self.last_time = 0  # log times of the first and the last message [ns]
         self._index: dict[int, list[tuple[int, int]]] = {}  # channel -> log time and offset of each of its messages
 
     def add(self, channel: int, log_time: int, publish_time: int, data: bytes) -> None:
-        """Append one message."""
         if not self._index:
             self.first_time = log_time
         self.last_time = log_time
@@ -91,13 +75,15 @@ class _Chunk:
         """Bytes of the chunk written at offset ``start``, and its entry in the summary."""
         times = {'message_start_time': self.first_time, 'message_end_time': self.last_time}
         data, size = bytes(self.data), len(self.data)
-        chunk = _packed(Chunk(**times, compression='', data=data, uncompressed_size=size, uncompressed_crc=crc32(data)))
+        chunk = _packed(
+            records.Chunk(**times, compression='', data=data, uncompressed_size=size, uncompressed_crc=crc32(data))
+        )
         offsets = {}
         indices: Any = RecordBuilder()
         for channel, messages in self._index.items():
             offsets[channel] = start + len(chunk) + indices.count
-            MessageIndex(channel_id=channel, records=messages).write(indices)
-        entry = ChunkIndex(
+            records.MessageIndex(channel_id=channel, records=messages).write(indices)
+        entry = records.ChunkIndex(
             **times,
             chunk_start_offset=start,
             chunk_length=len(chunk),
@@ -110,7 +96,7 @@ class _Chunk:
         return chunk + indices.end(), _packed(entry)
 
 
-def _packed(record: McapRecord) -> bytes:
+def _packed(record: records.McapRecord) -> bytes:
     builder: Any = RecordBuilder()
     record.write(builder)
     return cast(bytes, builder.end())
@@ -123,13 +109,12 @@ class McapOutput:
         self.path = path
         self._stream = _Stream(path)
         try:
-            self._stream.write(MCAP0_MAGIC + _packed(Header('ros2', 'seal_friction_ros')))
+            self._stream.write(MCAP0_MAGIC + _packed(records.Header('ros2', 'seal_friction_ros')))
         except OSError:
             self._stream.close()
             path.unlink(missing_ok=True)
             raise
-        self.counts: dict[tuple[str, str], int] = {}
-        """topic and type -> messages"""
+        self.counts: dict[tuple[str, str], int] = {}  # topic and type -> messages
         self.first_time = self._last_time = self._pending = 0
         self._channels: dict[tuple[str, str], int] = {}  # topic and type -> number
         self._schema_records, self._channel_records, self._chunk_entries = list[bytes](), list[bytes](), list[bytes]()
@@ -163,8 +148,10 @@ class McapOutput:
             self.first_time = log_time
         number = self._channels[key] = len(self._channels) + 1
         type_name, encoding, definition, metadata = description
-        schema = Schema(id=number, name=type_name, encoding=encoding, data=definition)
-        channel = Channel(id=number, schema_id=number, topic=key[0], message_encoding=ENCODING, metadata=metadata)
+        schema = records.Schema(id=number, name=type_name, encoding=encoding, data=definition)
+        channel = records.Channel(
+            id=number, schema_id=number, topic=key[0], message_encoding=ENCODING, metadata=metadata
+        )
         self._schema_records.append(_packed(schema))
         self._channel_records.append(_packed(channel))
         self._chunk.data += self._schema_records[-1] + self._channel_records[-1]
@@ -184,9 +171,9 @@ class McapOutput:
     def finish(self, metadata: str) -> None:
         """Write pending messages, ``metadata`` for rosbag2, the index and the end of the file."""
         self.flush()
-        record = _packed(Metadata('rosbag2', {'serialized_metadata': metadata}))
-        place = MetadataIndex(offset=self._stream.tell(), length=len(record), name='rosbag2')
-        self._stream.write(record + _packed(DataEnd(data_section_crc=0)))
+        record = _packed(records.Metadata('rosbag2', {'serialized_metadata': metadata}))
+        place = records.MetadataIndex(offset=self._stream.tell(), length=len(record), name='rosbag2')
+        self._stream.write(record + _packed(records.DataEnd(data_section_crc=0)))
         self._stream.write(self._summary(self._stream.tell(), _packed(place)))
 
     def _summary(self, start: int, metadata: bytes) -> bytes:
@@ -201,15 +188,17 @@ class McapOutput:
         }
         summary, offsets = b'', b''
         for opcode, group in groups.items():
-            place = SummaryOffset(group_opcode=opcode, group_start=start + len(summary), group_length=len(group))
+            place = records.SummaryOffset(
+                group_opcode=opcode, group_start=start + len(summary), group_length=len(group)
+            )
             offsets += _packed(place)
             summary += group
-        footer = Footer(summary_start=start, summary_offset_start=start + len(summary), summary_crc=0)
+        footer = records.Footer(summary_start=start, summary_offset_start=start + len(summary), summary_crc=0)
         footer.summary_crc = crc32(_packed(footer)[:-4], crc32(summary + offsets))
         return summary + offsets + _packed(footer) + MCAP0_MAGIC
 
-    def _statistics(self) -> Statistics:
-        return Statistics(
+    def _statistics(self) -> records.Statistics:
+        return records.Statistics(
             message_count=sum(self.counts.values()),
             channel_message_counts={self._channels[key]: count for key, count in self.counts.items()},
             message_start_time=self.first_time,
@@ -229,8 +218,8 @@ class McapOutput:
         size, self.first_time, self._last_time, counts = self._marks[-1]
         self.counts, self._pending = dict(counts), 0
         self._stream.cut(size)
-        footer = Footer(summary_start=0, summary_offset_start=0, summary_crc=0)
-        self._stream.write(_packed(DataEnd(data_section_crc=0)) + _packed(footer) + MCAP0_MAGIC)
+        footer = records.Footer(summary_start=0, summary_offset_start=0, summary_crc=0)
+        self._stream.write(_packed(records.DataEnd(data_section_crc=0)) + _packed(footer) + MCAP0_MAGIC)
 
     def give_back(self) -> bool:
         """Drop the newest chunk to make room; False if there is none."""

@@ -55,7 +55,6 @@ class _Topic:
         return any(f'{quantity}[{joint}]' in self.step for quantity in ('position', 'velocity'))
 
     def take(self, path: str, value: float) -> None:
-        """Take one number."""
         if math.isfinite(value):
             self.low[path] = min(value, self.low.get(path, value))
             self.high[path] = max(value, self.high.get(path, value))
@@ -163,7 +162,6 @@ def _look(bag: Path) -> dict[str, _Topic]:
 
 
 def _paths(definition: Definition, one: _Topic) -> list[str]:
-    """Paths of the numbers that are looked at."""
     if one.kind == JOINT_STATE:
         usable = [name for name in one.names if name and not set(name) & set('[]')]
         return [f'{quantity}[{name}]' for quantity in ('position', 'velocity', 'effort') for name in usable]
@@ -208,7 +206,6 @@ def _actuator(name: str, number: int, names: list[str], topic: str, found: dict[
 
 
 def _pressures(name: str, number: int, names: list[str], found: dict[str, _Topic]) -> list[str]:
-    """Inputs of both chambers."""
     sources = _pressure_sources(name, number, names, found)
     lowest = [found[source[0]].low.get(source[1], math.inf) for source in sources if source]
     is_gauge = min(lowest, default=math.inf) < LOWEST_ABSOLUTE  # sensors of one actuator are of one kind
@@ -262,7 +259,6 @@ def _of_actuator(name: str, names: list[str], kind: str, found: dict[str, _Topic
 
 
 def _load(name: str, names: list[str], found: dict[str, _Topic]) -> list[str]:
-    """The force sum."""
     cells = _of_actuator(name, names, WRENCH, found)
     if not cells:
         return [

@@ -15,7 +15,7 @@ from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.units import QUANTITY_OF, unit_named, unit_size
 from seal_friction_ros.core.machine.gauge_or_absolute import HIGHEST_AMBIENT, LOWEST_ABSOLUTE
 from seal_friction_ros.offline.bags import log_table
-from seal_friction_ros.offline.bags.log_table import Expected, Layout, share_of_numbers, split
+from seal_friction_ros.offline.bags.log_table import Expected, Layout, split
 from seal_friction_ros.offline.work.targets import mark
 
 _NAMES = {
@@ -53,7 +53,6 @@ class _Column(NamedTuple):
     high: float
 
     def term(self, **more: object) -> str:
-        """The column as a term of a rig file."""
         named = {'column_name': self.name} if self.name else {'column': self.number}
         fields = {**named, 'unit': self.unit, **more}
         return '{' + ', '.join(f'{key}: {json.dumps(value)}' for key, value in fields.items()) + '}'
@@ -68,7 +67,7 @@ def new_rig(log: Path) -> str:
     """Text of a rig file for a log; ValueError if the log cannot be read, or its head has no rows of numbers."""
     head = log_table.head_of(log)
     rows = [text for _, text in head if not text.startswith('#')]
-    first = next((number for number, text in enumerate(rows) if _is_row(text)), None)
+    first = next((number for number, text in enumerate(rows) if log_table.best(text)[0] > 0.5), None)
     if first is None:
         raise ValueError(f'{log}: no row of numbers in its first {len(head)} lines')
     kind = 'row' if first else 'comment' if head[0][1].startswith('#') else 'none'
@@ -77,10 +76,6 @@ def new_rig(log: Path) -> str:
     units = _units_below(rows[:first], layout)
     columns = [_column(number, layout, units, column) for number, column in enumerate(values.T)]
     return '\n'.join(_lines(log, kind, columns, values)) + '\n'
-
-
-def _is_row(text: str) -> bool:
-    return any(share_of_numbers(split(text, mark)) > 0.5 for mark in (';', '\t', ',', None) if not mark or mark in text)
 
 
 def _units_below(above: Sequence[str], layout: Layout) -> list[str]:

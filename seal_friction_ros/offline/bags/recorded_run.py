@@ -83,10 +83,8 @@ class RecordedRun:
 def read_run(bag: Path, namespace: str = '', mapping: MappingFile | None = None) -> RecordedRun:
     """Read a bag of inputs and estimates; arguments as of `open_actuator`, with a mapping the estimates are made here.
 
-    The inputs of an estimate are those held when the velocity sample of the same stamp arrived.
-
-    Raises:
-        BagError: The bag cannot be read, or holds no estimates.
+    The inputs of an estimate are those held when the velocity sample of the same stamp arrived. BagError: the bag
+    cannot be read, or holds no estimates.
     """
     source = open_actuator(bag, namespace, mapping)
     if not source.topics.estimate:

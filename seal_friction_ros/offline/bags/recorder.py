@@ -74,10 +74,8 @@ class Recorder:
         keep_size: int = 0,
         owner: str = '',
     ) -> None:
-        self.path = path
-        """Folder of the present bag, or of the last one"""
-        self.error = ''
-        """why the recording has stopped; empty while it goes on"""
+        self.path = path  # Folder of the present bag, or of the last one
+        self.error = ''  # why the recording has stopped; empty while it goes on
         self._free_space, self._keep_size, self._owner = free_space, keep_size, owner
         self._offered = self._refused = 0  # messages since the newest bag began
         self._saved = 0  # those of them in the bag that failed

@@ -50,14 +50,10 @@ class Recovery:
 
 
 def recover(bag: Path, out: Path | None = None) -> Recovery:
-    """Copy every readable message, in order, to a new bag.
+    """Copy every readable message, in order, from an MCAP file or a folder, with any or no metadata, to a new bag.
 
-    Args:
-        bag: Folder of a bag, with any or no ``metadata.yaml``, or an MCAP file.
-        out: Bag to make; must not exist. Default: beside ``bag``, with ``_recovered`` after its name.
-
-    Raises:
-        BagError: Nothing can be read, or ``out`` exists already; then nothing is left at ``out``.
+    It is ``out``, by default beside ``bag`` with ``_recovered`` after its name. BagError: nothing can be read, or
+    ``out`` exists already; then nothing is left at ``out``.
     """
     files = _files(bag)
     out = out or bag.resolve().with_name(f'{bag.resolve().stem if bag.is_file() else bag.resolve().name}_recovered')
@@ -90,7 +86,6 @@ def _parts(name: str) -> list[str | int]:
 
 
 def _copy(path: Path, writer: BagWriter, found: Recovery) -> None:
-    """Copy the readable messages of one file."""
     descriptions: dict[tuple[str, str], Description] = {}
 
     def on_fault(block: Block, reason: str) -> None:

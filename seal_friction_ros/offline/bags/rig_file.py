@@ -64,8 +64,7 @@ _CHOICES = {
 class Term(CheckedParameters):
     """One column of the log with its unit, times a gain with a unit (for example an area, or a sensor scale).
 
-    Raises:
-        ValueError: The column is named twice or not at all, or there is no such unit.
+    ValueError: the column is named twice or not at all, or there is no such unit.
     """
 
     column: int = parameter(-1, unit='', lower=-1, upper=9999, description='Number of the column, counted from 0.')
@@ -109,8 +108,7 @@ class Combination(CheckedParameters):
 class Rig(CheckedParameters):
     """Format of the logs of one rig.
 
-    Raises:
-        ValueError: A value is out of bounds, or the unit of a column does not fit its quantity.
+    ValueError: a value is out of bounds, or the unit of a column does not fit its quantity.
     """
 
     name: str

@@ -41,17 +41,14 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:  # type: ignore[override]
         """As of the base class; the parser of a command names its own unknown options."""
         if not any(isinstance(action, argparse._SubParsersAction) for action in self._actions):
-            for word in args or ():
-                self._check_option(word.partition('=')[0])
+            for word in (given.partition('=')[0] for given in args or ()):
+                is_option = word.startswith('--') and word != '--'
+                if is_option and not any(option.startswith(word) for option in self._options()):
+                    self._refuse(word)  # before what is missing
         known, unknown = super().parse_known_args(args, namespace)
         if unknown:
             self._refuse(unknown[0].partition('=')[0])
         return known, unknown
-
-    def _check_option(self, word: str) -> None:
-        """Check an option before the others, so that a mistyped one is not told to be missing."""
-        if word.startswith('--') and word != '--' and not any(option.startswith(word) for option in self._options()):
-            self._refuse(word)
 
     def _options(self) -> list[str]:
         return [option for action in self._actions for option in action.option_strings if option.startswith('--')]
@@ -104,8 +101,7 @@ def _help(description: str, examples: Sequence[str]) -> dict[str, Any]:
     return {**shown, 'formatter_class': argparse.RawDescriptionHelpFormatter}
 
 
-Settings = dict[str, Any]
-"""Of an option, as of `argparse`."""
+Settings = dict[str, Any]  # Of an option, as of `argparse`.
 
 
 def add_options(parser: Any, table: Mapping[str, tuple[str, Settings]]) -> None:
@@ -298,7 +294,6 @@ def quantities(*units: str) -> Callable[[str], tuple[float, ...]]:
     """Type of an option: numbers in SI or with a unit, separated by commas, one for each of these ``units`` of SI."""
 
     def values(text: str) -> tuple[float, ...]:
-        """Numbers in SI that a text is."""
         parts = text.split(',')
         if len(parts) != len(units):
             raise argparse.ArgumentTypeError(f'{text} is not {len(units)} values, separated by commas')
@@ -327,7 +322,6 @@ def at_least(least: int) -> Callable[[str], int]:
     """Type of an option: a whole number of at least ``least``."""
 
     def whole_number(text: str) -> int:
-        """Number that a text is."""
         if int(text) < least:
             raise argparse.ArgumentTypeError(f'{text} is below {least}')
         return int(text)

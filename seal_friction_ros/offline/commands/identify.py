@@ -81,8 +81,7 @@ NOT_FOR_KINDS = {'seal': 'seal', 'squeeze_force': 'squeeze-force', 'chambers': '
 def _kinds(arguments: argparse.Namespace) -> dict[str, Any]:
     """Options of several kinds of seals.
 
-    Raises:
-        ValueError: There is one, two have the same name, or an option is of one kind.
+    ValueError: there is one, two have the same name, or an option is of one kind.
     """
     from seal_friction_ros.core.identification.candidate_laws import SealKind
 
@@ -98,13 +97,6 @@ def _kinds(arguments: argparse.Namespace) -> dict[str, Any]:
         raise ValueError(f'--seal-kind {", ".join(names)}: give two kinds at least, with different names')
     kinds = tuple(SealKind(*kind) for kind in arguments.kinds)
     return {'kinds': kinds} | ({} if error is None else {'largest_kind_error': error})
-
-
-def _of_sources(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Options of the sources."""
-    from seal_friction_ros.offline.identification.sources import SourceOptions
-
-    return {**cli.options_from(arguments, SourceOptions), 'mapping': cli.mapping_of(arguments)}
 
 
 def _seal_files(arguments: argparse.Namespace) -> dict[str, Path]:
@@ -126,7 +118,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.next and arguments.report and arguments.next.with_suffix('.html') == arguments.report:
         raise ValueError(f'{arguments.report}: --next writes its page there: choose another name for one of them')
     others = {name: value for name, value in cli.options_from(arguments, IdentifyOptions).items() if 'kind' not in name}
-    options = IdentifyOptions(**{**others, **kinds, 'sources': SourceOptions(**_of_sources(arguments))})
+    of_sources = {**cli.options_from(arguments, SourceOptions), 'mapping': cli.mapping_of(arguments)}
+    options = IdentifyOptions(**{**others, **kinds, 'sources': SourceOptions(**of_sources)})
     paths = [one for one in arguments.sources if isinstance(one, Path)]
     targets = [(path, SEAL_FILE) for path in files.values()]
     with checked_targets('identify', targets, paths, force=arguments.force):

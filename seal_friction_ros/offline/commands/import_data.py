@@ -66,7 +66,6 @@ def run_bag(arguments: argparse.Namespace) -> int:
 
 
 def _of_log(summary: 'ImportSummary', _: Path) -> tuple[dict[str, Any], str]:
-    """Numbers and text for an imported log."""
     dropped = [f'{count} rows left out: {reason}' for reason, count in summary.dropped.items()]
     return summary._asdict(), '\n  '.join([f'{summary.rows} rows', *dropped, *summary.remarks])
 

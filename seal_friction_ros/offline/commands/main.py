@@ -51,7 +51,6 @@ class _Version(argparse.Action):
     """Prints the version, which is read only if it is asked for."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        """Print and exit."""
         from seal_friction_ros.files import package_version
 
         print(f'seal_friction {package_version()}')

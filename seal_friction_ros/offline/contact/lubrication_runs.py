@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.errors import NotConvergedError
+from seal_friction_ros.core.foundation.errors import NotConvergedError, named_errors
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.presliding import presliding_of_map
@@ -58,22 +58,18 @@ def load_case(name: str) -> LubricationCase:
 def read_case(name: str, parse: Callable[[Any, Callable[[str], OringCaseFile]], Parsed]) -> Parsed:
     """What ``parse`` makes of a case file and of the loader of its O-ring.
 
-    Raises:
-        ValueError: The file cannot be read or a value is invalid; one line that names the file.
+    ValueError: the file cannot be read or a value is invalid; one line that names the file.
     """
     path = config_path('ehl', name)
     document = read_yaml(path)
-    try:
+    with named_errors(path):
         return parse(document, lambda oring: load_oring(oring, path.parent))
-    except ValueError as error:
-        raise ValueError(f'{path}: {error}') from None
 
 
 def load_oring(name: str, beside: Path) -> OringCaseFile:
     """O-ring case file in the folder ``beside``, from a path, or of a name in config/oring.
 
-    Raises:
-        ValueError: The file cannot be read or a value is invalid; one line that names the file.
+    ValueError: the file cannot be read or a value is invalid; one line that names the file.
     """
     local = beside / f'{name}.yaml'
     path = local if local.is_file() else config_path('oring', name)
@@ -183,15 +179,9 @@ class MapRuns(NamedTuple):
 
 
 def run_map(case: LubricationCase, workers: Workers, work: Path | None = None) -> MapRuns:
-    """Compute the friction map of a case.
+    """Compute the friction map of a case; ValueError: a film did not converge, or the folder cannot be used.
 
-    Args:
-        case: The case.
-        workers: Parts at a time, or a cluster.
-        work: Folder that keeps finished parts, so that an interrupted map resumes; None keeps none.
-
-    Raises:
-        ValueError: A film did not converge, or the folder cannot be used.
+    The folder ``work`` keeps finished parts, so that an interrupted map resumes; None keeps none.
     """
     known = varied_case(case, {})
     memory_part = Part(part_key('memory', asdict(known)), MemoryLength._fields, partial(memory_length, known))

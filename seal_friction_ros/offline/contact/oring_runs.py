@@ -7,6 +7,7 @@ from pathlib import Path
 from statistics import linear_regression
 from typing import Any, NamedTuple
 
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.friction.actuator import Uncertainty
 from seal_friction_ros.core.friction.geometry import stretch_force
 from seal_friction_ros.core.friction.laws.contact_shear import ShearLaw
@@ -29,7 +30,7 @@ from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty as Spread
 from seal_friction_ros.offline.contact.uncertainty import check_unknown
 from seal_friction_ros.offline.work.progress import progress
-from seal_friction_ros.offline.work.seal_writer import rounded
+from seal_friction_ros.offline.work.seal_writer import rounded, rounded_numbers
 
 DIGITS = 8  # of a computed number in a seal file
 
@@ -50,20 +51,15 @@ class OringSummary:
     case: str
     sliding_wall: str
     pressure_Pa: tuple[float, ...]
-    normal_force_N: tuple[float, ...]
-    """integral of the contact stress over the sliding wall"""
-    wall_force_N: tuple[float, ...]
-    """integral of all stress of that wall where it is above the pressure of the fluid"""
+    normal_force_N: tuple[float, ...]  # integral of the contact stress over the sliding wall
+    wall_force_N: tuple[float, ...]  # integral of all stress of that wall where it is above the pressure of the fluid
     stretch_force_N: float  # of the ring stretched over its inner wall, by the hoop equation of the thesis
-    axial_force_N: tuple[float, ...]
-    """axial force of the gland on the ring"""
+    axial_force_N: tuple[float, ...]  # axial force of the gland on the ring
     peak_contact_stress_Pa: tuple[float, ...]
     contact_width_m: tuple[float, ...]
     area_deformation_gain: float | None  # slope of normal over axial force by least squares; None with one pressure
-    radial_force_N: float | None
-    """value of that line at zero axial force; None with one pressure"""
-    friction_N: tuple[float, ...] | None
-    """sliding friction of one seal, if the case has a law for it"""
+    radial_force_N: float | None  # value of that line at zero axial force; None with one pressure
+    friction_N: tuple[float, ...] | None  # sliding friction of one seal, if the case has a law for it
     shear_stress_Pa: float | None  # of the contact at 1 MPa of contact stress; None without a shear law
     shear_exponent: float | None
     friction_relative_std: float | None
@@ -107,6 +103,9 @@ def compute_case(
 ) -> Computed:
     """Compute a case file, with a progress bar.
 
+    ValueError: the file is invalid or insufficient for a seal file, or the ring does not fit, does not seal or has no
+    equilibrium.
+
     Args:
         path: The case file.
         pressures: Increasing pressures instead of those in the file [Pa, gauge].
@@ -115,13 +114,9 @@ def compute_case(
         for_seal_file: Refuse a case without what `seal_document` needs, before computing; one without friction has
             `PRIOR`.
         for_samples: Refuse a case in which nothing is unknown, before computing.
-
-    Raises:
-        ValueError: The file is invalid or insufficient for a seal file, or the ring does not fit, does not seal or has
-            no equilibrium.
     """
     document = read_yaml(path)
-    try:
+    with named_errors(path):
         file = parse_oring_case(document)
         wanted = tuple(pressures) or file.pressures
         check_pressures(file.case, wanted)
@@ -139,8 +134,6 @@ def compute_case(
                 results.append(result)
                 advance(1)
         fitted = _fitted(file, results, readings) if readings else None
-    except ValueError as error:
-        raise ValueError(f'{path}: {error}') from None
     if fitted is not None:
         known = file.friction or PRIOR
         friction = dataclasses.replace(known, law=fitted.law, uncertainty=Uncertainty(fitted.relative_std))
@@ -192,14 +185,10 @@ def _profile(contact: WallContact) -> Profile:
 
 
 def seal_document(computed: Computed, spread: Spread | None = None) -> dict[str, Any]:
-    """Seal file whose law is a table over the computed pressures.
+    """Seal file whose law is a table over the computed pressures, of a case that was computed ``for_seal_file``.
 
-    Args:
-        computed: The case and its results, computed ``for_seal_file``.
-        spread: Of the friction, from samples; None: the uncertainty of its law.
-
-    Raises:
-        ValueError: It was not, or the friction falls with pressure.
+    The ``spread`` of the friction is that of samples; None: the uncertainty of its law. ValueError: the case was not
+    computed for it, or the friction falls with pressure.
     """
     file, law, friction = computed.file, computed.friction_law, computed.file.friction
     if law is None or friction is None:
@@ -213,22 +202,13 @@ def seal_document(computed: Computed, spread: Spread | None = None) -> dict[str,
         'name': file.case.name,
         'source': ' '.join(source.split()),
         'geometry': asdict(file.case.geometry),
-        **_rounded(law_document(law)),
+        **rounded_numbers(law_document(law), DIGITS),
         'stiction': friction.stiction,
         **({'stiction_ratio': rounded(friction.stiction_ratio, 3)} if friction.stiction_ratio else {}),
         'uncertainty': asdict(friction.uncertainty) | {'relative_std': rounded(found, 3)},
         'identified_pressure': [pressures[0], pressures[-1]],
         **({'identified_speed': [min(speeds), max(speeds)]} if speeds else {}),
     }
-
-
-def _rounded(value: Any) -> Any:
-    """A document with numbers of `DIGITS` digits."""
-    if isinstance(value, dict):
-        return {key: _rounded(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_rounded(item) for item in value]
-    return rounded(value, DIGITS) if isinstance(value, float) else value
 
 
 def seal_comment(computed: Computed) -> str:

@@ -45,17 +45,9 @@ def latin_hypercube(unknowns: Sequence[Unknown], samples: int, seed: int) -> Flo
 def uncertain_map(
     case: LubricationCase, samples: int, seed: int, workers: Workers, work: Path | None = None
 ) -> Uncertainty:
-    """Friction over speed and pressure of samples of a case, on a coarser grid.
+    """Friction over speed and pressure of samples of a case, on a coarser grid; ``work`` as of `run_map`.
 
-    Args:
-        case: The case.
-        samples: Their number.
-        seed: Of the values.
-        workers: Calls at a time, or a cluster.
-        work: As of `lubrication_runs.run_map`.
-
-    Raises:
-        ValueError: Nothing is unknown, the case itself cannot be computed on this grid, or all samples but one failed.
+    ValueError: nothing is unknown, the case itself cannot be computed on this grid, or all samples but one failed.
     """
     names, drawn = _drawn(case.name, case.unknown, samples, seed)
     coarse = coarse_case(case)
@@ -114,7 +106,6 @@ def uncertain_ring(
     names, drawn = _drawn(case.name, file.unknown, samples, seed)
 
     def parts_of(values: Mapping[str, float]) -> list[Part]:
-        """The one part of a sample."""
         varied = varied_ring(case, values)
         check_pressures(varied, pressures)
         key = part_key('ring', [asdict(varied), pressures, type(law).__name__, asdict(law) if law else {}])
@@ -164,17 +155,9 @@ def sampled(
 ) -> Sampled:
     """Compute the parts of a case, and of each sample; one that fails does not stop the others.
 
-    Args:
-        label: Of the progress bar.
-        names: Of the unknowns.
-        drawn: Their values, shape (samples, unknowns).
-        parts_of: Parts of the case with other values; ValueError if there is no such case.
-        workers: Calls at a time, or a cluster.
-        work: Keeps finished parts.
-        prepare: As of `try_all`.
-
-    Raises:
-        ValueError: The case itself failed, or the folder or the cluster cannot be used.
+    ``drawn`` has the values of the unknowns, shape (samples, unknowns). ``parts_of`` makes the parts of the case with
+    other values; ValueError if there is no such case. Other arguments as of `run_parts`. ValueError: the case itself
+    failed, or the folder or the cluster cannot be used.
     """
     groups, failed = {-1: parts_of({})}, dict[int, str]()
     for number, row in enumerate(drawn.tolist()):

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.actuator import MountedSeal, Seal, actuator_friction
@@ -47,23 +48,19 @@ class SealForces:
 def seal_of(path: Path) -> Seal:
     """Seal of a seal file, or of an O-ring case, which is computed.
 
-    Raises:
-        ValueError: The file is neither, or the case cannot be computed.
+    ValueError: the file is neither, or the case cannot be computed.
     """
     document = read_yaml(path)
     if isinstance(document, dict) and 'groove' in document:
         document = seal_document(compute_case(path, for_seal_file=True))
-    try:
+    with named_errors(path):
         return parse_seal(document)
-    except ValueError as error:
-        raise ValueError(f'{path}: {error}') from None
 
 
 def seal_forces(path: Path, pressures: Sequence[float], speed: float, seals: int) -> SealForces:
     """Friction of ``seals`` equal seals at each pressure [Pa, gauge] and ``speed`` [m/s, 0: Coulomb friction].
 
-    Raises:
-        ValueError: As of `seal_of`.
+    ValueError: as of `seal_of`.
     """
     seal = seal_of(path)
     mounted = seals * (MountedSeal(seal, 'a'),)

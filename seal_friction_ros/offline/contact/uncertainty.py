@@ -15,22 +15,14 @@ _ONE_STD = (0.1587, 0.8413)  # shares of a normal distribution below minus and p
 
 
 def check_unknown(name: str, unknowns: Sequence[Unknown]) -> None:
-    """Check that something is unknown in the case of this ``name``.
-
-    Raises:
-        ValueError: Nothing is.
-    """
+    """Check that something is unknown in the case of this ``name``; ValueError: nothing is."""
     if not unknowns:
         raise ValueError(f'case {name} does not say what is unknown: give it the key unknown, see docs/ehl.md')
 
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """Samples of a force over pressure and speed.
-
-    Raises:
-        ValueError: Fewer than two samples could be computed.
-    """
+    """Samples of a force over pressure and speed; ValueError: fewer than two samples could be computed."""
 
     seed: int
     names: tuple[str, ...]  # of the unknowns

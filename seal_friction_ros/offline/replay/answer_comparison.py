@@ -107,14 +107,10 @@ def replay_result(
     is_cut: bool,
     names_topics: bool = False,
 ) -> ReplayResult:
-    """Result at the end of a bag.
+    """Result at the end of a bag, of its streams by message type or topic.
 
-    Args:
-        velocities: Number of velocity samples.
-        streams: By message type or topic.
-        versions: Of the algorithm, of each recorded configuration.
-        is_cut: The answer to the last message may be missing.
-        names_topics: Whether the first difference begins with its topic.
+    The ``versions`` of the algorithm are those of the recorded configurations. ``is_cut``: the answer to the last
+    message may be missing. ``names_topics``: the first difference begins with its topic.
     """
     recorded: Counter[str] = Counter()
     for stream in streams.values():

@@ -62,19 +62,12 @@ def bag_health(
     on_block: Callable[[Messages, Answers, Any], None] = lambda *_: None,
     mapping: MappingFile | None = None,
 ) -> BagHealth:
-    """Health from one bag.
+    """Health from one bag; BagError: the bag cannot be read, or not in blocks.
 
-    Args:
-        bag: The bag.
-        namespace: As of `open_actuator`.
-        override: Configuration instead of the recorded one; its mode counts as observe.
-        learnt: What was learnt from the bags before; None: nothing.
-        on_block: Called with each block of messages, the answers to them, and the estimates among these as a structured
-            array with the fields of `FrictionEstimate`.
-        mapping: As of `open_actuator`.
-
-    Raises:
-        BagError: The bag cannot be read, or not in blocks.
+    The ``override`` is the configuration instead of the recorded one; its mode counts as observe. ``learnt`` is what
+    was learnt from the bags before. ``on_block`` is called with each block of messages, the answers to them, and the
+    estimates among these as a structured array with the fields of `FrictionEstimate`. ``namespace`` and ``mapping`` as
+    of `open_actuator`.
     """
     rows: list[FloatArray] = []
     starts: list[float] = []
@@ -167,7 +160,6 @@ class _Observer(Run):
     """Estimator with ``adaptation.mode`` observe, which keeps what it has learnt when the configuration changes."""
 
     def configure(self, snapshot: Snapshot) -> None:
-        """Take a recorded configuration."""
         learnt = self.state.estimator.adaptation
         super().configure(snapshot._replace(configuration=_observing(snapshot.configuration)))
         self.state.estimator.adaptation = learnt

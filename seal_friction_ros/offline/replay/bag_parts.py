@@ -38,18 +38,10 @@ def try_bags(
 ) -> list[Outcome[Any]]:
     """Outcome of a computation on each bag, in the order of the bags.
 
-    Args:
-        kind: What is computed, also the label of the progress bar.
-        bags: The bags: paths, or URLs that are copied where they are computed.
-        record: Named tuple of a result.
-        call: Picklable function of a bag and ``chosen`` that makes a record, whose values are as of `Part`.
-        chosen: What of each bag is used, and how.
-        workers: Bags at a time, or a cluster.
-        kept: Where outcomes are kept, by content and path of a bag and by the settings.
-        prepare: As of `try_all`.
-
-    Raises:
-        ValueError: The work folder or the cluster cannot be used.
+    ``kind`` says what is computed, also beside the progress bar; ``call`` is a picklable function of a bag and
+    ``chosen`` that makes a ``record``, a named tuple whose values are as of `Part`. Outcomes are kept by content and
+    path of a bag and by the settings. A URL is copied where it is computed. ValueError: the work folder or the cluster
+    cannot be used.
     """
     override, mapping = chosen.override, chosen.mapping
     known = [chosen.namespace, snapshot_text(first_snapshot(override)) if override else '', repr(chosen.limits)]

@@ -39,15 +39,13 @@ class _Topic(NamedTuple):
     read: Callable[[], Iterator[BagMessage]]
 
     def messages(self) -> Iterator[BagMessage]:
-        """Its messages."""
         return (message for message in self.read() if message.topic == self.name)
 
 
 _NO_DIFFERENCE = FieldDifference(0.0, 0.0, 0)
 FRICTION_FIELDS = ('state', 'direction', 'coulomb_friction', 'breakaway_force', 'friction_force')
 """Fields of an estimate that decide by default: not what was learnt, its deviations, and the age of the inputs."""
-COUNTED = ('state', 'direction', 'status', 'limited')
-"""Fields that are no quantities: their differences are counted."""
+COUNTED = ('state', 'direction', 'status', 'limited')  # Fields that are no quantities: their differences are counted.
 
 
 @dataclass(frozen=True)
@@ -105,8 +103,9 @@ def compare(
     """Compare a topic of two bags, each message with the one of the same stamp.
 
     Messages of equal stamp in one bag are paired in order, the last with the last, since recordings of one run mostly
-    begin at different times (our choice). Messages without a stamp (configurations) are paired in the same way.
-    Two numbers agree if ``|b - a| <= atol + rtol |a|`` or if both are NaN, other values if they are equal.
+    begin at different times (our choice). Messages without a stamp (configurations) are paired in the same way. Two
+    numbers agree if ``|b - a| <= atol + rtol |a|`` or if both are NaN, other values if they are equal. BagError: a bag
+    cannot be read or has no such topic, a message on it is of an unknown type, or no stamp is in both bags.
 
     Args:
         bag_a: First bag, the reference.
@@ -118,10 +117,6 @@ def compare(
             on estimates, and all fields on other messages.
         namespace: As of `open_actuator`.
         mapping: Likewise; then the estimates are made here.
-
-    Raises:
-        BagError: A bag cannot be read or has no such topic, a message on it is of an unknown type, or no stamp is in
-            both bags.
     """
     a, b = (_topic_of(bag, topic, namespace, mapping) for bag in (bag_a, bag_b))
     stamps_a, stamps_b = _stamps(a), _stamps(b)
@@ -134,7 +129,7 @@ def compare(
     own: dict[str, float | None] = dict(tolerances or {})
     for number, one, other in _decoded_pairs((a, numbers_a), (b, numbers_b)):
         identical = identical and one[0] == other[0]
-        own = own or _usual(one[1])
+        own = own or dict.fromkeys(FRICTION_FIELDS if {*FRICTION_FIELDS} <= one[1].keys() else one[1])
         for name, value in one[1].items():
             then, absolute = other[1].get(name), own.get(name)
             difference, within = _difference(value, then, atol if absolute is None else absolute, rtol)
@@ -151,11 +146,6 @@ def compare(
     if unknown := [name for name in own if name not in fields]:
         raise BagError(f'{topics}: no field {unknown[0]!r} to compare: there are {", ".join(fields)}')
     return BagComparison(topics, *counts, pairs, identical, first, fields, tuple(own))
-
-
-def _usual(message: Mapping[str, Any]) -> dict[str, float | None]:
-    """Fields that decide by default."""
-    return dict.fromkeys(FRICTION_FIELDS if set(FRICTION_FIELDS) <= set(message) else message)
 
 
 def _pairs(stamps_a: _Numbers, stamps_b: _Numbers) -> tuple[_Numbers, _Numbers]:

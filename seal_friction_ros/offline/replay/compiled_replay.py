@@ -53,12 +53,9 @@ def replay_in_bulk(
 
 
 class Run:
-    """The estimator on its way through blocks of messages.
+    """The estimator on its way through blocks of messages, with the configuration and the state at the beginning.
 
-    Args:
-        configuration: At the beginning.
-        state: Likewise; None: before any message.
-        has_override: Whether the configuration stays, whatever the bag says.
+    Without a state it is before any message. With ``has_override`` the configuration stays, whatever the bag says.
     """
 
     def __init__(
@@ -67,8 +64,7 @@ class Run:
         self.configuration, self._has_override = configuration, has_override
         self._parameters = configuration.parameters()
         self._tells_sending = state is not None and configuration.tells_sending
-        self.versions: set[int] = set()
-        """of the algorithm that made the recorded configurations used"""
+        self.versions: set[int] = set()  # of the algorithm that made the recorded configurations used
         self.state = init(self._parameters) if state is None else state
 
     def compared(
@@ -165,7 +161,6 @@ def kinds_of_topics(topics: Topics) -> KindOf:
     }
 
     def kind_of(topic: str, type_name: str) -> Kind:
-        """Kind of the messages on a topic."""
         other = Kind.OTHER_ESTIMATE if type_name == ESTIMATE_TYPE else Kind.OTHER
         wanted, kind = known.get(topic, (type_name, other))
         if topic == topics.clock:
@@ -226,11 +221,9 @@ def _compare(
     """Compare recorded messages from number ``taken`` on with answers from number ``used`` on, in the simple case.
 
     The case is simple while they agree and, once the first difference has a text (``is_named``), while exactly one
-    answer waits. A recorded message may be ``grown`` [bytes] shorter, as it was before its type grew.
-
-    Returns:
-        Number of the first recorded message that is not simple, of the first answer that waits for it, and the number
-        of differences.
+    answer waits. A recorded message may be ``grown`` [bytes] shorter, as it was before its type grew. Returns the
+    number of the first recorded message that is not simple, of the first answer that waits for it, and the number of
+    differences.
     """
     data, offsets, sizes = ours
     recorded, recorded_offsets, recorded_sizes = theirs

@@ -18,20 +18,13 @@ from seal_friction_ros.core.machine.machine_snapshot import (
     snapshot_of,
 )
 from seal_friction_ros.core.machine.outputs import due_commands
+from seal_friction_ros.core.messages import layouts
 from seal_friction_ros.core.messages.coder import decode_text, encode, encode_text, type_of
 from seal_friction_ros.core.messages.definitions import full_name
-from seal_friction_ros.core.messages.layouts import (
-    CLOCK_TYPE,
-    CONFIGURATION_TYPE,
-    ESTIMATE_TYPE,
-    FEEDFORWARD_TYPE,
-    MACHINE_TYPE,
-    OUTPUTS,
-    TICK_TYPE,
-)
 from seal_friction_ros.core.messages.records import NEVER, Output
 from seal_friction_ros.core.messages.together import NamedAnswer, encode_together
 from seal_friction_ros.files import default_configuration, load_configuration, load_parameter_file, with_seal
+from seal_friction_ros.offline.bags import bag as rosbag
 from seal_friction_ros.offline.bags.actuator_bag import (
     ANSWER_TOPICS,
     RECORDED,
@@ -39,18 +32,6 @@ from seal_friction_ros.offline.bags.actuator_bag import (
     ActuatorBag,
     find_topics,
     source_of,
-)
-from seal_friction_ros.offline.bags.bag import (
-    CONFIGURATION_TOPIC,
-    STATE_NAME,
-    STATE_PERIOD,
-    STATE_TYPE,
-    BagMessage,
-    BagWriter,
-    TopicInfo,
-    message_error,
-    named,
-    read_definitions,
 )
 from seal_friction_ros.offline.replay.answer_comparison import AnswerStream, ReplayResult, replay_result
 from seal_friction_ros.offline.work.progress import counted, progress
@@ -83,23 +64,17 @@ class Answer(NamedTuple):
 class Step(NamedTuple):
     """One message, and the answers of the estimator to it."""
 
-    message: BagMessage
+    message: rosbag.BagMessage
     answers: tuple[Answer, ...]
 
 
 class Replay:
-    """The machine of a bag on its way through the messages, and what it answers to each.
+    """The machine of a bag, or one actuator of it, on its way through the messages, and what it answers to each.
 
     A bag of ``friction_estimator`` is that of a machine with the built-in mapping. The machine is that of the newest
-    configuration in the bag. A bag without configuration is replayed by the default one, with the built-in mapping.
-
-    Args:
-        bag: The bag, or one actuator of it.
-        override: Configuration of each actuator instead of the recorded one.
-        namespace: Use only topics below it; the name of an actuator of a machine: that actuator alone.
-
-    Raises:
-        BagError: The bag cannot be read, or has not what the estimator needs.
+    configuration in the bag. A bag without configuration is replayed by the default one, with the built-in mapping. The
+    ``override`` is the configuration of each actuator instead of the recorded one; ``namespace`` as of `source_of`.
+    BagError: the bag cannot be read, or has not what the estimator needs.
     """
 
     def __init__(self, bag: Path | ActuatorBag, override: Configuration | None = None, namespace: str = '') -> None:
@@ -107,18 +82,13 @@ class Replay:
         """topics of the bag"""
         self.answers: dict[str, str] = {}
         """topic -> message type of all that the machine makes, in the order in which it makes them"""
-        self.compared: dict[str, str] = {}
-        """those of them that the bag has"""
-        self.has_names = False
-        """whether its actuators have names"""
-        self.estimates = 0
-        """made so far"""
-        self.versions: set[int] = set()
-        """of the algorithm that made the recorded configurations used"""
+        self.compared: dict[str, str] = {}  # those of them that the bag has
+        self.has_names = False  # whether its actuators have names
+        self.estimates = 0  # made so far
+        self.versions: set[int] = set()  # of the algorithm that made the recorded configurations used
         self._override = override
-        self.configuration = self._configuration or CONFIGURATION_TOPIC
-        """topic of the configuration in `steps`"""
-        self._state_topic = f'{self.configuration.rpartition("/")[0]}/{STATE_NAME}'
+        self.configuration = self._configuration or rosbag.CONFIGURATION_TOPIC  # topic of the configuration in `steps`
+        self._state_topic = f'{self.configuration.rpartition("/")[0]}/{rosbag.STATE_NAME}'
         self.kept: Collection[str] = {*self.topics, self._state_topic}
         """topics that the bag of a replay keeps, besides the answers"""
         self._topic_of: dict[tuple[str, str], str] = {}  # name of an actuator and message type -> topic
@@ -141,7 +111,7 @@ class Replay:
         """
         if not self._configuration:
             text = machine_text(first_of_replay(self._override or default_configuration()))
-            yield Step(BagMessage(self.configuration, CONFIGURATION_TYPE, 0, encode_text(text)), ())
+            yield Step(rosbag.BagMessage(self.configuration, layouts.CONFIGURATION_TYPE, 0, encode_text(text)), ())
         newest, due = NEVER, NEVER  # [ns] log time of the message before, and of the next state
         for message in self._read():
             if message.topic == self._state_topic:
@@ -149,7 +119,7 @@ class Replay:
             if due <= message.log_time > newest:  # of messages of one time none is before a state and another after it
                 if due != NEVER:
                     yield from self._state_at(message.log_time)
-                due = message.log_time + round(STATE_PERIOD * 1e9)
+                due = message.log_time + round(rosbag.STATE_PERIOD * 1e9)
             newest = message.log_time
             used = message if self._tells_sending else message._replace(publish_time=message.log_time)
             if message.topic == self._configuration:
@@ -159,27 +129,27 @@ class Replay:
 
     def acted(self) -> dict[str, str]:
         """Topic of each recorded feed-forward that acted -> topic that keeps it in the bag of a replay."""
-        guided = [topic for topic, kind in self.answers.items() if kind == FEEDFORWARD_TYPE]
+        guided = [topic for topic, kind in self.answers.items() if kind == layouts.FEEDFORWARD_TYPE]
         kept = {topic: topic + RECORDED for topic in guided}
         return {name if name in self.topics or self.is_replayed else topic: name for topic, name in kept.items()}
 
-    def kept_of(self, step: Step) -> Iterator[BagMessage]:
+    def kept_of(self, step: Step) -> Iterator[rosbag.BagMessage]:
         """What the bag of a replay keeps of a step: inputs, configuration, new answers and the force that acted."""
         message, acted = step.message, self.acted()
         if message.topic in acted:
             yield message._replace(topic=acted[message.topic])
         elif message.topic in self.kept and message.topic not in self.answers:
             yield message
-            yield from (BagMessage(topic, kind, message.log_time, data) for topic, kind, data in step.answers)
+            yield from (rosbag.BagMessage(topic, kind, message.log_time, data) for topic, kind, data in step.answers)
 
     def _state_at(self, log_time: int) -> Iterator[Step]:
         if self._machine is not None and self._state is not None:
             text = encode_text(machine_text(snapshot_of(self._machine, self._state)))
-            yield Step(BagMessage(self._state_topic, STATE_TYPE, log_time, text), ())
+            yield Step(rosbag.BagMessage(self._state_topic, rosbag.STATE_TYPE, log_time, text), ())
 
-    def _configure(self, message: BagMessage) -> BagMessage:
+    def _configure(self, message: rosbag.BagMessage) -> rosbag.BagMessage:
         """Take a configuration; the message with the one that is used."""
-        with named(self._bag, message):
+        with rosbag.named(self._bag, message):
             snapshot = parse_machine_text(decode_text(message.data))
             self._tells_sending = snapshot.tells_sending
             if self._override is None:
@@ -193,7 +163,7 @@ class Replay:
         file = snapshot.file
         self.has_names = file.document is not None
         if self.has_names:
-            self._machine, self._state = machine_of(snapshot, read_definitions(self._bag, file.topics.values()))
+            self._machine, self._state = machine_of(snapshot, rosbag.read_definitions(self._bag, file.topics.values()))
             self._plans = {**self._machine.plans, **self._ticks_and_clock(file)}
             self._topic_of = self._answers_of(file)
         else:
@@ -202,7 +172,7 @@ class Replay:
             self._machine, self._state = machine_of(snapshot, {}, inputs)
             self._plans = dict(self._machine.plans)
             self._topic_of = {('', kind): topic or ANSWER_TOPICS[kind] for kind, topic in topics.answers.items()}
-            self.kept = {*topics, CONFIGURATION_TOPIC, self._state_topic}
+            self.kept = {*topics, rosbag.CONFIGURATION_TOPIC, self._state_topic}
         outputs = {one.output.topic: full_name(one.output.type_name) for one in file.actuators if one.output}
         self.answers = {topic: kind for (_, kind), topic in self._topic_of.items()} | outputs
         present = {topic for topic, info in self.topics.items() if info.message_count and topic in self.kept}
@@ -210,18 +180,18 @@ class Replay:
 
     def _ticks_and_clock(self, file: MachineFile) -> dict[str, TopicPlan]:
         numbers = range(len(file.actuators))
-        ticks = {self._topic(f'/{file.actuators[number].name}/watchdog_tick', TICK_TYPE): number for number in numbers}
-        plans = {topic: record_plan(topic, TICK_TYPE, (number,)) for topic, number in ticks.items()}
-        clocks = [topic for topic, info in self.topics.items() if info.type_name == CLOCK_TYPE]
-        return plans | {topic: record_plan(topic, CLOCK_TYPE, numbers) for topic in clocks}
+        ticks = [self._topic(f'/{one.name}/watchdog_tick', layouts.TICK_TYPE) for one in file.actuators]
+        plans = {topic: record_plan(topic, layouts.TICK_TYPE, (number,)) for number, topic in enumerate(ticks)}
+        clocks = [topic for topic, info in self.topics.items() if info.type_name == layouts.CLOCK_TYPE]
+        return plans | {topic: record_plan(topic, layouts.CLOCK_TYPE, numbers) for topic in clocks}
 
     def _answers_of(self, file: MachineFile) -> dict[tuple[str, str], str]:
         if file.together:
-            return {('', MACHINE_TYPE): self._topic('/friction', MACHINE_TYPE)}
+            return {('', layouts.MACHINE_TYPE): self._topic('/friction', layouts.MACHINE_TYPE)}
         return {
             (actuator.name, kind): self._topic(f'/{actuator.name}/{topic}', kind)
             for actuator in file.actuators
-            for topic, kind in OUTPUTS.items()
+            for topic, kind in layouts.OUTPUTS.items()
         }
 
     def _topic(self, end: str, kind: str) -> str:
@@ -229,17 +199,18 @@ class Replay:
         found = [topic for topic, info in self.topics.items() if info.type_name == kind and topic.endswith(end)]
         return found[0] if found else end
 
-    def _answers_to(self, message: BagMessage) -> Iterable[Answer]:
+    def _answers_to(self, message: rosbag.BagMessage) -> Iterable[Answer]:
         """Answers to a message; BagError if it does not match its type."""
         plan = self._plans.get(message.topic)
         if plan is None or self._machine is None or self._state is None:
             return ()
         try:
             record = plan.read(message.data)
-        except ValueError as error:
+        except ValueError:
             if self.has_names:  # as the node: it counts the message as malformed
                 return ()
-            raise message_error(self._bag, message, error) from None
+            with rosbag.named(self._bag, message):
+                raise
         self._made.clear()
         self._state = receive(
             self._machine, self._state, plan, record, message.log_time, self._collect, message.publish_time
@@ -252,14 +223,15 @@ class Replay:
     def _encoded(self, machine: Machine, state: MachineState, received: int) -> list[Answer]:
         """What was collected, and the commands that follow from it, as bytes."""
         kinds = [type_of(answer.record) for answer in self._made]
-        self.estimates += kinds.count(ESTIMATE_TYPE)
+        self.estimates += kinds.count(layouts.ESTIMATE_TYPE)
         answers = []
         if not machine.file.together:
             for kind, (name, record, frame_id) in zip(kinds, self._made, strict=True):
                 answers.append(Answer(self._topic_of[name, kind], kind, encode(record, frame_id)))
         elif self._made:
-            answers = [Answer(self._topic_of['', MACHINE_TYPE], MACHINE_TYPE, encode_together(self._made))]
-        commands = due_commands(machine, state, FEEDFORWARD_TYPE in kinds, received)
+            together = layouts.MACHINE_TYPE
+            answers = [Answer(self._topic_of['', together], together, encode_together(self._made))]
+        commands = due_commands(machine, state, layouts.FEEDFORWARD_TYPE in kinds, received)
         return answers + [Answer(command.topic, full_name(command.type_name), command.data) for command in commands]
 
 
@@ -269,31 +241,24 @@ def replay(
     """Replay a bag and compare the answers with the recorded ones; with ``out``, write inputs and answers as a new bag.
 
     The new bag keeps the recorded feed-forward, which acted on the axis, on a topic whose name ends with `RECORDED`.
-
-    Args:
-        bag: The bag, of any machine.
-        override: Configuration instead of the recorded one, of every actuator.
-        out: Bag to write.
-        namespace: As of `Replay`.
-
-    Raises:
-        BagError: The bag cannot be read, or ``out`` exists already; then nothing is left at ``out``.
+    Other arguments as of `Replay`. BagError: the bag cannot be read, or ``out`` exists already; then nothing is left at
+    ``out``.
     """
     replayed = Replay(bag, override, namespace)
     with progress(f'replay {bag.name}', count_messages(replayed.topics)) as advance:
         steps = counted(replayed.steps(), advance)
         if out is None:
             return _compare(steps, replayed)
-        with BagWriter(out) as writer:
+        with rosbag.BagWriter(out) as writer:
             return _compare(_written(steps, replayed, writer), replayed)
 
 
-def count_messages(topics: Mapping[str, TopicInfo]) -> int:
+def count_messages(topics: Mapping[str, rosbag.TopicInfo]) -> int:
     """Number of messages on all topics."""
     return sum(info.message_count for info in topics.values())
 
 
-def _written(steps: Iterable[Step], replayed: Replay, writer: BagWriter) -> Iterator[Step]:
+def _written(steps: Iterable[Step], replayed: Replay, writer: rosbag.BagWriter) -> Iterator[Step]:
     for step in steps:
         for message in replayed.kept_of(step):
             writer.write(*message)
@@ -314,7 +279,7 @@ def _compare(steps: Iterable[Step], replayed: Replay) -> ReplayResult:
         is_answer = replayed.compared.get(message.topic) == message.type_name
         if is_answer:
             _stream(streams, message.topic, message.type_name).compare_recorded(message.data)
-        is_cut = bool(answers) or message.type_name == ESTIMATE_TYPE
+        is_cut = bool(answers) or message.type_name == layouts.ESTIMATE_TYPE
         is_cut = is_cut or (is_answer and message.topic != next(reversed(replayed.answers)))
     ordered = {topic: streams[topic] for topic in replayed.answers if topic in streams}
     return replay_result(replayed.estimates, ordered, replayed.versions, is_cut=is_cut, names_topics=replayed.has_names)

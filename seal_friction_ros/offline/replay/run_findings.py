@@ -62,8 +62,7 @@ def _raised(rms: float, change: float) -> Iterator[Finding]:
 def bag_findings(bag: Path, chosen: Chosen) -> list[Finding]:
     """Findings of a bag; its estimates are made here if it has none, or if another configuration is chosen.
 
-    Raises:
-        BagError: The bag cannot be read.
+    BagError: the bag cannot be read.
     """
     mapping, namespace = chosen.mapping, chosen.namespace
     if mapping is None and (chosen.override is not None or not open_actuator(bag, namespace).topics.estimate):

@@ -27,7 +27,6 @@ class _CommandCollector:
         self.columns = growing(2 + sum(_HELD.values()))
 
     def add(self, block: Block) -> None:
-        """Take one block."""
         commands = [(place, number) for place, _, number in block.decoded('command', self._number)]
         places, numbers = np.array(commands).reshape(-1, 2).T
         found = {name: block.of(name) for name in ('pressure', 'position')}

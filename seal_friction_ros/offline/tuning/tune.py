@@ -267,15 +267,10 @@ def tune_simulator(
 def tune_bag(
     actuator: ActuatorBag, known: RecordedAxisSettings, configuration: Configuration | None = None
 ) -> BagTuning:
-    """Find the feed-forward that matches the friction in a bag of a real axis.
+    """Find the feed-forward that matches the friction in a bag of a real axis; the estimates are computed anew.
 
-    Args:
-        actuator: Pressure, velocity, force sum and reference; the estimates are computed anew.
-        known: Known properties of the axis.
-        configuration: Seals, estimator and feed-forward instead of those in the bag.
-
-    Raises:
-        BagError: The bag cannot be read, or an input is missing in it.
+    The ``configuration`` has seals, estimator and feed-forward instead of those in the bag. BagError: the bag cannot be
+    read, or an input is missing in it.
     """
     recording, track, recorded = read_recording(actuator, configuration)
     with named_errors(actuator.path, raised=BagError):
@@ -331,7 +326,6 @@ class _AxisCollector(RunCollector):
         self._references: list[tuple[Numbers, IntArray]] = []  # with the number of estimates before each
 
     def add(self, block: Block) -> None:
-        """Take one block."""
         references = block.of('reference')
         before = len(self.stamps) + np.searchsorted(block.of('estimate').places, references.places)
         self._references.append((references, before))

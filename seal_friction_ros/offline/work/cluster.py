@@ -36,12 +36,11 @@ _ADDRESS = re.compile(r'(tcp|tls)://(\[[0-9a-fA-F:.%]+\]|[\w.-]+):(\d{1,5})')
 class Cluster:
     """A Dask cluster.
 
+    ValueError: the address is none, or TLS is for one of both only.
+
     Args:
         address: Of its scheduler, ``tcp://HOST:PORT`` or, with TLS, ``tls://HOST:PORT``.
         tls: Files in PEM: certificate of the authority, own certificate, own key; None without TLS.
-
-    Raises:
-        ValueError: The address is none, or TLS is for one of both only.
     """
 
     address: str
@@ -74,7 +73,6 @@ class _Running:
         self._start = (str(Path.cwd()), dict(versions()))
 
     def begin(self, number: int) -> None:
-        """Send a call."""
         call = self._calls[number]
         future = self._client.submit(_run, call, _paths_here(call), *self._start, pure=False)
         self.futures[number] = future
@@ -105,7 +103,6 @@ class _Running:
         return number, answer
 
     def forget_after(self, number: int) -> None:
-        """Forget the calls after this one."""
         for later in [one for one in self.futures if one > number]:
             self.futures.pop(later).release()
 
@@ -140,16 +137,10 @@ def completed_on(
     """Number and outcome of each call as it is done.
 
     At most a few calls for each worker are under way, so that memory does not grow with the number of calls. A worker
-    that ends amid a call costs time: another one repeats the call. A call that ends several workers has crashed.
-
-    Args:
-        cluster: Where.
-        calls: As of `executor.try_all`, and importable by name on the workers.
-        stop_at_error: Begin no call after an error, and leave out those after it.
-
-    Raises:
-        MissingPackageError: Dask is not installed.
-        ValueError: The cluster cannot be used, or not any more; one line.
+    that ends amid a call costs time: another one repeats the call. A call that ends several workers has crashed. Calls
+    are as of `executor.try_all`, and importable by name on the workers; with ``stop_at_error`` no call begins after an
+    error, and those after it are left out. MissingPackageError: Dask is not installed; ValueError: the cluster cannot
+    be used, or not any more; one line.
     """
     with _connected(cluster) as client:
         most = _CALLS_OF_A_WORKER * _checked_workers(client)

@@ -20,8 +20,7 @@ from seal_friction_ros.offline.work.outcome import CRASHED, Outcome, outcome_of
 from seal_friction_ros.offline.work.progress import progress, report_shares_to
 
 Result = TypeVar('Result')
-Workers = int | Cluster
-"""number of processes of this computer, or a cluster"""
+Workers = int | Cluster  # number of processes of this computer, or a cluster
 
 
 def nothing() -> None:
@@ -42,6 +41,8 @@ def try_all(
 ) -> list[Outcome[Result]]:
     """Run every call, whatever becomes of the others, and return the outcomes in their order.
 
+    ValueError: the cluster cannot be used.
+
     Args:
         label: Of the progress bar.
         calls: Picklable functions without arguments that return picklable results. ``ValueError`` and ``OSError`` are
@@ -49,9 +50,6 @@ def try_all(
         workers: Calls at a time, or a cluster.
         on_outcome: Called in this process with the number of a call and its outcome, as soon as it is done.
         prepare: Called before the processes of this computer begin; they inherit what it loads and compiles.
-
-    Raises:
-        ValueError: The cluster cannot be used.
     """
     outcomes: dict[int, Outcome[Result]] = {}
     for number, outcome in _completed(label, calls, workers, prepare, stop_at_error=False):
@@ -69,11 +67,9 @@ def run_all(
 ) -> list[Result]:
     """Run calls that are of use only together, and return their results in order; arguments as `try_all`.
 
-    ``on_result`` is called in this process with the number of a call and its result, as soon as it is done.
-
-    Raises:
-        ValueError: A call failed: the first one, in the order of the calls; or the cluster cannot be used. No further
-            call is begun after an error.
+    ``on_result`` is called in this process with the number of a call and its result, as soon as it is done. ValueError:
+    a call failed: the first one, in the order of the calls; or the cluster cannot be used. No further call is begun
+    after an error.
     """
     results: dict[int, Result] = {}
     errors: dict[int, str] = {}

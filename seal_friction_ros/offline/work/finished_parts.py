@@ -22,8 +22,7 @@ from seal_friction_ros.offline.work.outcome import CRASHED, Outcome
 from seal_friction_ros.offline.work.places import Place, url_digest
 from seal_friction_ros.offline.work.versions import versions
 
-Values = Mapping[str, Any]
-"""Result of a part: numbers, texts and arrays of at least one element, by name."""
+Values = Mapping[str, Any]  # Result of a part: numbers, texts and arrays of at least one element, by name.
 
 
 class Part(NamedTuple):
@@ -33,8 +32,7 @@ class Part(NamedTuple):
     names: tuple[str, ...]  # of the values in the result
     call: Callable[[], Any]
     """picklable function that computes the part; returns `Values`, or a named tuple with these fields"""
-    output: Path | None = None
-    """folder that the call makes; without it the part is not finished"""
+    output: Path | None = None  # folder that the call makes; without it the part is not finished
 
 
 class Kept(NamedTuple):
@@ -86,15 +84,8 @@ def run_parts(
 ) -> list[Values]:
     """Results, in order, of parts that are of use only together; parts that are kept in ``folder`` are not computed.
 
-    Args:
-        label: Of the progress bar.
-        parts: The parts.
-        workers: Parts at a time, or a cluster.
-        folder: Keeps every finished part as a JSON file, also when a later part fails; None keeps none.
-        prepare: As of `try_all`, if a part is missing.
-
-    Raises:
-        ValueError: A part failed, or the folder or the cluster cannot be used.
+    The folder keeps every finished part as a JSON file, also when a later part fails; None keeps none. Other arguments
+    as of `try_all`. ValueError: a part failed, or the folder or the cluster cannot be used.
     """
     outcomes, missing = _found(parts, Kept(folder, retry_failed=True))
 

@@ -8,20 +8,19 @@ import hashlib
 import json
 import re
 import signal
+import sys
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import FrameType
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
 from seal_friction_ros.offline.work.outcome import error_text
 from seal_friction_ros.packages import MissingPackageError, needed
 
-Place = Path | str
-"""path of a file or folder, or a URL"""
+Place = Path | str  # path of a file or folder, or a URL
 
 _URL = re.compile(r'[A-Za-z][A-Za-z0-9+.:-]*://.+')
 _VERSION = ('etag', 'md5', 'md5hash', 'contentmd5', 'crc32c', 'checksum', 'mtime', 'lastmodified', 'modified')
@@ -142,12 +141,8 @@ def _ended_in_order() -> Iterator[None]:
     signals = [one for one in (signal.SIGTERM, signal.SIGINT) if signal.getsignal(one) is signal.SIG_DFL]
     try:
         for one in signals:
-            signal.signal(one, _end)
+            signal.signal(one, lambda number, _: sys.exit(128 + number))
         yield
     finally:
         for one in signals:
             signal.signal(one, signal.SIG_DFL)
-
-
-def _end(number: int, _: FrameType | None) -> None:
-    raise SystemExit(128 + number)

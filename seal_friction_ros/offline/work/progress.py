@@ -32,14 +32,8 @@ def report_shares_to(report: Callable[[float], None]) -> None:
 def progress(label: str, total: int | None) -> Iterator[Callable[[float], None]]:
     """Show a bar on stderr while the block runs, if stderr is a terminal and the package rich is installed.
 
-    No thread draws the bar, so that a process may fork inside the block.
-
-    Args:
-        label: Text beside the bar.
-        total: Number of steps; None if unknown.
-
-    Yields:
-        Function to call with the number of steps done since the last call.
+    No thread draws the bar, so that a process may fork inside the block. ``total`` is the number of steps, None if
+    unknown. Yields a function to call with the number of steps done since the last call.
     """
     if _report_share is not None:
         yield _shares(total, _report_share)

@@ -19,10 +19,7 @@ class ShearLaw(CheckedParameters):
 
     It belongs to rubber, wall and lubricant, and holds for a ring of any size. n = 1 is a constant coefficient of
     friction; n = 0 is the limit of a constant shear stress over the real contact, where that is all of the contact. The
-    form is our choice.
-
-    Raises:
-        ValueError: A value is out of bounds.
+    form is our choice. ValueError: a value is out of bounds.
     """
 
     shear_stress: float = parameter(
@@ -33,13 +30,9 @@ class ShearLaw(CheckedParameters):
     )
 
 
-def contact_shear(
-    shear_stress: float, table: Bound, last_pressure: float, end_slope: float, pressure: float, _speed: float
-) -> float:
-    """f_c = c A_n(P) [N]; above the last pressure A_n rises with the slope that it has there."""
-    beyond = pressure - last_pressure
-    beyond = max(beyond, 0.0)
-    return shear_stress * (evaluate(table, pressure, 0.0) + end_slope * beyond)
+def contact_shear(shear_stress: float, table: Bound, pressure: float, _speed: float) -> float:
+    """f_c = c A_n(P) [N]."""
+    return shear_stress * evaluate(table, pressure, 0.0)
 
 
 @dataclass(frozen=True)
@@ -51,10 +44,8 @@ class ContactShear(ShearLaw, FrictionLaw):
         A_n = \int (\sigma / 1\,\mathrm{MPa})^n\,dA
 
     `seal_friction oring` computes A_n at each pressure by finite elements. Above the last pressure A_n rises with the
-    slope that it has there (our choice).
-
-    Raises:
-        ValueError: Fewer than two pressures, pressures that do not increase, or an area that is not positive or falls.
+    slope that it has there (our choice). ValueError: fewer than two pressures, pressures that do not increase, or an
+    area that is not positive or falls.
     """
 
     NAME = 'contact_shear'
@@ -70,20 +61,9 @@ class ContactShear(ShearLaw, FrictionLaw):
 
     def check_together(self) -> None:
         """Check that the friction does not fall with pressure."""
-        if list(self.areas) != sorted(self.areas):
-            raise ValueError(f'ContactShear.areas = {list(self.areas)} m2 falls with pressure')
+        self.check_rises('areas')
 
     @cached_property
     def table(self) -> MonotoneTable:
         """A_n over pressure."""
-        return MonotoneTable(self.pressures, self.areas, 'ContactShear')
-
-    @property
-    def last_pressure(self) -> float:
-        """Last pressure of the table [Pa, gauge]."""
-        return self.pressures[-1]
-
-    @property
-    def end_slope(self) -> float:
-        """Slope of the table at its last pressure [m2/Pa]."""
-        return self.table.end_slope
+        return MonotoneTable(self.pressures, self.areas, 'ContactShear', rises=True)

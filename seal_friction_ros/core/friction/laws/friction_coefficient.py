@@ -56,10 +56,9 @@ def coefficient_table(table: Bound, normal_force: float, _unused: float) -> floa
 class CoefficientTable(FrictionCoefficientLaw):
     """Coefficient of friction by monotone interpolation over normal force, constant beyond both ends.
 
-    Source: thesis, chapter 7 (mu is "Defined at multiple F_n values") and Figure 18.
+    ValueError: fewer than two points, forces that do not increase, or a coefficient that is not positive.
 
-    Raises:
-        ValueError: Fewer than two points, forces that do not increase, or a coefficient that is not positive.
+    Source: thesis, chapter 7 (mu is "Defined at multiple F_n values") and Figure 18.
     """
 
     function = staticmethod(coefficient_table)

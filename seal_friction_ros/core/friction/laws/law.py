@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
 from seal_friction_ros.core.foundation.compiled import Bound, bound
-from seal_friction_ros.core.foundation.parameters import CheckedParameters
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, meanings
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,9 +31,14 @@ class Law(CheckedParameters):
     def check_together(self) -> None:
         """Check what the bounds of each parameter alone cannot; called once these hold.
 
-        Raises:
-            ValueError: Two parameters contradict each other.
+        ValueError: two parameters contradict each other.
         """
+
+    def check_rises(self, name: str) -> None:
+        """Check that the values of a field, one for each pressure, do not fall; ValueError if they do."""
+        values, unit = list(getattr(self, name)), meanings(self)[name].unit
+        if values != sorted(values):
+            raise ValueError(f'{type(self).__name__}.{name} = {values} {unit} falls with pressure')
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the parameters only: the rest follows from them."""

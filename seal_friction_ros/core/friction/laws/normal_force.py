@@ -38,13 +38,9 @@ class AreaDeformationGain(NormalForceLaw):
     radial_force: float = parameter(unit='N', lower=1e-6, upper=1e6, description='F_rad, normal force at no pressure.')
 
 
-def normal_force_table(
-    table: Bound, last_pressure: float, end_slope: float, pressure: float, _projected_area: float
-) -> float:
-    """Interpolated normal force [N]; above the last pressure it rises with the slope that it has there."""
-    beyond = pressure - last_pressure
-    beyond = max(beyond, 0.0)
-    return evaluate(table, pressure, 0.0) + end_slope * beyond
+def normal_force_table(table: Bound, pressure: float, _projected_area: float) -> float:
+    """Interpolated normal force [N]."""
+    return evaluate(table, pressure, 0.0)
 
 
 @dataclass(frozen=True)
@@ -52,10 +48,8 @@ class NormalForceTable(NormalForceLaw):
     """Normal force by monotone interpolation of computed or measured values over pressure.
 
     Above the last pressure the normal force rises with the slope that it has there (our choice: rubber under pressure
-    behaves as a fluid, so the normal force keeps rising).
-
-    Raises:
-        ValueError: Fewer than two points, or pressures or forces that do not increase, or a force that is not positive.
+    behaves as a fluid, so the normal force keeps rising). ValueError: fewer than two points, or pressures or forces
+    that do not increase, or a force that is not positive.
     """
 
     function = staticmethod(normal_force_table)
@@ -69,23 +63,12 @@ class NormalForceTable(NormalForceLaw):
 
     def check_together(self) -> None:
         """Check that the normal force does not fall with pressure."""
-        if list(self.normal_forces) != sorted(self.normal_forces):
-            raise ValueError(f'NormalForceTable.normal_forces = {list(self.normal_forces)} N falls with pressure')
+        self.check_rises('normal_forces')
 
     @cached_property
     def table(self) -> MonotoneTable:
         """Normal force over pressure."""
-        return MonotoneTable(self.pressures, self.normal_forces, 'NormalForceTable')
-
-    @property
-    def last_pressure(self) -> float:
-        """Last pressure of the table [Pa, gauge]."""
-        return self.pressures[-1]
-
-    @property
-    def end_slope(self) -> float:
-        """Slope of the table at its last pressure [N/Pa]."""
-        return self.table.end_slope
+        return MonotoneTable(self.pressures, self.normal_forces, 'NormalForceTable', rises=True)
 
 
 NORMAL_FORCE_LAWS: dict[str, type[NormalForceLaw]] = {

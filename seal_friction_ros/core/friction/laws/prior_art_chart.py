@@ -19,10 +19,9 @@ def prior_art_chart(squeeze_part: float, table: Bound, projected_area: float, pr
 class PriorArtChart(FrictionLaw):
     """Coulomb friction read from charts: F = f_c L_r + f_h(P) A_r.
 
-    Source: thesis, chapter 2 (Tables 1 to 3); monotone interpolation between the chart readings is our choice.
+    ValueError: a chart value is out of bounds, or friction falls with pressure.
 
-    Raises:
-        ValueError: A chart value is out of bounds, or friction falls with pressure.
+    Source: thesis, chapter 2 (Tables 1 to 3); monotone interpolation between the chart readings is our choice.
     """
 
     NAME = 'prior_art_chart'
@@ -43,10 +42,7 @@ class PriorArtChart(FrictionLaw):
 
     def check_together(self) -> None:
         """Check that the friction does not fall with pressure."""
-        if list(self.pressure_frictions) != sorted(self.pressure_frictions):
-            raise ValueError(
-                f'PriorArtChart.pressure_frictions = {list(self.pressure_frictions)} Pa falls with pressure'
-            )
+        self.check_rises('pressure_frictions')
 
     @cached_property
     def table(self) -> MonotoneTable:

@@ -1,7 +1,7 @@
 """What the velocity adds to a law that does not depend on the speed: viscous and Stribeck friction, asymmetry."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import NamedTuple
 
 from seal_friction_ros.core.foundation.compiled import compilable
@@ -87,6 +87,4 @@ class VelocityTerms(CheckedParameters):
     @property
     def numbers(self) -> VelocityTermNumbers:
         """The terms as numbers."""
-        return VelocityTermNumbers(
-            self.viscous_friction, self.stribeck_friction, self.stribeck_velocity, self.asymmetry
-        )
+        return VelocityTermNumbers(*astuple(self))
