@@ -55,11 +55,13 @@ class LawFit:
 
         A lower bound of 0 is a term that the data do not show, which is sound.
         """
-        for parameter in () if self.model is not None else self.law.parameters:
+        if self.model is not None:
+            return ''
+        for parameter in self.law.parameters:
             value, margin = self.values[parameter.name], 1e-6 * (parameter.upper - parameter.lower)
             if value > parameter.upper - margin or (parameter.lower != 0.0 and value < parameter.lower + margin):
                 return f'{parameter.name} is at its bound of {value:.3g}'
-        if self.model is None and not self.condition_number <= ILL_CONDITIONED:
+        if not self.condition_number <= ILL_CONDITIONED:
             return f'ill-conditioned: condition number {self.condition_number:.0f} (good below {ILL_CONDITIONED:.0f})'
         return ''
 

@@ -22,7 +22,7 @@ import numpy as np
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
-from seal_friction_ros.core.identification.readings import FrictionReadings
+from seal_friction_ros.core.identification.readings import FrictionReadings, numbered
 
 # Priors: mean, standard deviation, lower and upper bound. A share is one of the mean friction.
 FRICTION_PRIOR = (0.0, 10.0, 0.0, 100.0)  # [-] share: f_0, and the rise of each kind at its mean pressure
@@ -290,7 +290,7 @@ def _clusters(readings: FrictionReadings) -> IntArray:
     if readings.are_samples:
         turns = np.diff(readings.at.direction) != 0.0
         return np.concatenate(([0], np.cumsum(turns | (np.diff(readings.source) != 0))))
-    return np.asarray(np.unique(np.column_stack((readings.source, readings.level)), axis=0, return_inverse=True)[1])
+    return numbered(readings.source, readings.level)
 
 
 def _weights(readings: FrictionReadings, residual: FloatArray, size: float, fitted: float) -> FloatArray:
@@ -300,7 +300,7 @@ def _weights(readings: FrictionReadings, residual: FloatArray, size: float, fitt
     of a reading is that within a cluster, and as many times that between clusters as the cluster has readings. The
     latter is the geometric mean of that found, with its degrees of freedom, and of the prior (our choice).
     """
-    cluster = _clusters(readings).reshape(-1)
+    cluster = _clusters(readings)
     share = residual / np.maximum(readings.scale, 1e-3 * size)
     count = np.bincount(cluster)
     mean = np.bincount(cluster, share) / count

@@ -18,7 +18,7 @@ from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.mounting import pressures_at_seals
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions, SealKind, columns_of
 from seal_friction_ros.core.identification.friction_model import ModelFit, Told, fit_model
-from seal_friction_ros.core.identification.readings import NARROWEST_PRESSURES, FrictionReadings
+from seal_friction_ros.core.identification.readings import NARROWEST_PRESSURES, FrictionReadings, numbered
 from seal_friction_ros.core.identification.signal_preparation import Signals, held_pressures, pressure_levels
 
 TOGETHER = 0.98  # correlation of the pressures of the kinds above which they moved together (our choice)
@@ -47,7 +47,7 @@ def kinds_readings(
             inside = readings.source == source
             pressure[inside] = held_pressures(pressure[inside], readings.at.direction[inside])
         levels.append(pressure_levels(pressure))
-    condition = np.unique(np.column_stack(levels), axis=0, return_inverse=True)[1].reshape(-1)
+    condition = numbered(*levels)
     return replace(found, level=condition, group=condition, left_out_by='pressure')
 
 

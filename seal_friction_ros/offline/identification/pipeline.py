@@ -53,7 +53,7 @@ from seal_friction_ros.core.identification.selection import (
     choose_anew,
     collinear_spread,
     recommended,
-    rise_over_pressures,
+    rises_over_pressures,
     score_ladder,
     variation_of,
 )
@@ -297,12 +297,12 @@ def select_law(
     """
     with progress('fit and leave out', len(_candidates(data.used, data.ring)) + MOST_EXTENSIONS) as advance:
         scores = _scored(data.used, data.ring, data.sources.has_fitted_load, advance)
-    best = recommended(scores, rise_over_pressures(data.used))
+    best = recommended(scores, rises=rises_over_pressures(data.used))
     settled, readings, share = _settled(data, best), data.used, np.ones(data.used.count)
     is_no_run_in = False
     if settled is not None and len(data.used.levels) >= FEWEST_TO_COMPARE:
         of_settled = _scored(settled.readings, data.ring, data.sources.has_fitted_load)
-        best_settled = recommended(of_settled, rise_over_pressures(settled.readings))
+        best_settled = recommended(of_settled, rises=rises_over_pressures(settled.readings))
         if best_settled.mean_loss <= (1.0 + WORTHWHILE) * best.mean_loss:
             scores, best, (readings, share, _) = of_settled, best_settled, settled
         else:
@@ -366,8 +366,8 @@ def _choose_anew(
 
 def _recommended(readings: FrictionReadings, ring: Ring | None, has_fitted_load: bool) -> LawScore:
     """Recommended law for the readings that are left."""
-    predictable = with_predictable_groups(readings)
-    return recommended(_scored(predictable, ring, has_fitted_load), rise_over_pressures(predictable))
+    scores = _scored(with_predictable_groups(readings), ring, has_fitted_load)
+    return recommended(scores, rises=rises_over_pressures(readings))
 
 
 def _scored(
@@ -440,7 +440,7 @@ def _levels(
     unseen[:, 0] = selection.validation.predicted
     if selection.chosen_anew is not None:
         unseen[:, 1] = selection.chosen_anew.predicted
-    predicted = [unseen[inside].mean(axis=0).tolist() for inside in data.used.levels.values()]
+    predicted = data.used.level_means(unseen).tolist()
     if data.outlier is not None:
         predicted.insert(list(readings.levels).index(data.outlier.level), [data.outlier.expected] * 2)
     return tuple(
