@@ -148,6 +148,6 @@ def between_runs(
             return deviations_in_std(law, others, left_out, near)
     in_addition = run_to_run
     if in_addition is None:
-        friction = fit(law, others, near, is_close=True).friction(others.at)
+        friction = fit(law, others, near).friction(others.at)
         in_addition = runs.between_runs(others, friction, offsets_of(others, friction)).of_band
     return deviations_in_std(law, others, left_out, near, in_addition)

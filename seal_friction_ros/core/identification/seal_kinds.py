@@ -67,15 +67,10 @@ def area_errors(readings: FrictionReadings, told: Told) -> AreaErrors | None:
     """Errors of the areas in the force sum, fitted together with the terms ``told``; None if no pressure swung."""
     if not (np.ptp(readings.chamber_pressures, axis=0) > NARROWEST_PRESSURES).any():
         return None
-    columns = [_columns(readings.kinds, number) for number in range(len(readings.kinds))]
+    columns = [columns_of(readings.kinds, number) for number in range(len(readings.kinds))]
     model = fit_model(readings, columns, told._replace(areas=True), readings.chamber_pressures)
     area_a, area_b = (-model.areas).tolist()
     return AreaErrors((area_a, area_b), model.surest_area > SURE_AREA)
-
-
-def _columns(kinds: Sequence[SealKind], number: int) -> tuple[int, ...]:
-    inside = columns_of(kinds, number)
-    return tuple(range(inside.start, inside.stop))
 
 
 class ToldApart(NamedTuple):

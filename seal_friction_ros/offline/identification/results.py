@@ -378,8 +378,18 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
             'correlation': selection.fit.correlation.tolist(),
             'offset_N': [level.offset for level in levels],
             'area_correction_m2': correction.area if correction else None,
-            'area_correction': correction and _correction_numbers(correction),
-            'offset_line': correction and _line_numbers(correction),
+            'area_correction': correction
+            and {
+                'chamber': correction.chamber,
+                'is_made': correction.is_significant,
+                'standard_error_m2': correction.standard_error,
+            },
+            'offset_line': correction
+            and {
+                'constant_N': correction.line.constant,
+                'area_error_m2': correction.line.area_error,
+                'rms_N': correction.line.rms,
+            },
             'between_run_std': quality.between_runs.std,
             'between_runs_measured': quality.between_runs.measured,
             'told_apart_std': quality.told_apart,
@@ -429,19 +439,6 @@ def _settled_numbers(settled: SettledLaw, quality: LawQuality) -> dict[str, Any]
         'fitted_N': fitted,
         'std_N': np.hypot(relative * fitted, quality.uncertainty.absolute),
     }
-
-
-def _correction_numbers(correction: ForceCorrection) -> dict[str, Any]:
-    return {
-        'chamber': correction.chamber,
-        'is_made': correction.is_significant,
-        'standard_error_m2': correction.standard_error,
-    }
-
-
-def _line_numbers(correction: ForceCorrection) -> dict[str, float]:
-    line = correction.line
-    return {'constant_N': line.constant, 'area_error_m2': line.area_error, 'rms_N': line.rms}
 
 
 def _breakaway_numbers(found: Identification) -> dict[str, Any]:

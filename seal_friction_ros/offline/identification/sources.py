@@ -106,17 +106,16 @@ class Sources:
         """Whether a load over position was fitted to a log; friction larger in one direction counts as load there."""
         return any(source.load is not None for source in self.each)
 
-    def prepare(self, index: Sequence[int] | None = None) -> PreparedReadings:
-        """Readings of all sources, or of those numbered in ``index``.
+    def prepare(self) -> PreparedReadings:
+        """Readings of all sources.
 
         Raises:
             ValueError: They are unfit for identification.
         """
-        chosen = self.each if index is None else [self.each[i] for i in index]
-        logs = [source.log for source in chosen if source.log is not None]
+        logs = [source.log for source in self.each if source.log is not None]
         if logs:
             return prepare_logs(logs, self.chambers)
-        dynamic, static = zip(*(source.manual for source in chosen if source.manual is not None), strict=True)
+        dynamic, static = zip(*(source.manual for source in self.each if source.manual is not None), strict=True)
         with_static = [readings for readings in static if len(readings.friction)]
         return prepare_manual_readings(dynamic, with_static, len(self.chambers))
 
@@ -265,7 +264,7 @@ def _read_log(path: Path, options: SourceOptions) -> Source:
             check_clipping(path.name, where, column[moving] * UNITS[term.unit], is_pressure=is_pressure)
     seconds = (samples.stamp - samples.stamp[0]) * 1e-9
     signals = Signals(seconds, samples.velocity, samples.chamber_a, samples.chamber_b, samples.force_sum)
-    recorded, texts = _admitted(RecordedLog(path.name, signals, sliding, log.temperature, log.position), options)
+    recorded, texts = _admitted(RecordedLog(path.name, signals, sliding, log.temperature, log.position))
     remarks = (*remarks, *texts, *(f'{path.name}: {text}' for text in log.remarks))
     source = Source(_data_file(path), None, recorded, pressure_area=_pressure_area(rig), remarks=remarks)
     if log.position is None or rig.load == 'none':
@@ -329,27 +328,20 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
     temperature = _from_the_first(columns[5] + ZEROS['degC']) if topics.temperature else None
     position = columns[4] if topics.position else None
     dropped = {SAME_STAMP: order.same_stamp} if order.same_stamp else {}
-    log = _admitted(
-        RecordedLog(bag.name, Signals(order.seconds, *columns[:4]), Sliding(), temperature, position, dropped), options
-    )
-    places = position if holds_load else None
+    signals, sliding = Signals(order.seconds, *columns[:4]), _sliding(Sliding(), options)
+    log, texts = _admitted(RecordedLog(bag.name, signals, sliding, temperature, position, dropped))
     return Source(
         _data_file(path),
         chambers,
-        log.log,
+        log,
         seal_document=document,
         has_placeholder=has_placeholder,
-        load_position=places,
-        remarks=(*(f'{bag.name}: {text}' for text in order.texts), *log.remarks),
+        load_position=position if holds_load else None,
+        remarks=(*(f'{bag.name}: {text}' for text in order.texts), *texts),
     )
 
 
-class _Admitted(NamedTuple):
-    log: RecordedLog
-    remarks: tuple[str, ...]
-
-
-def _admitted(log: RecordedLog, options: SourceOptions) -> _Admitted:
+def _admitted(log: RecordedLog) -> tuple[RecordedLog, tuple[str, ...]]:
     """The log with single missing values bridged, and remarks on it.
 
     Raises:
@@ -361,15 +353,14 @@ def _admitted(log: RecordedLog, options: SourceOptions) -> _Admitted:
     missing = int((~np.isfinite(np.array(columns)).all(axis=0)).sum())
     check_admitted(log.name, len(signals.time) + sum(log.dropped.values()), {**log.dropped, NOT_FINITE: missing})
     texts = (f'{log.name}: {count} samples had no value, and are on a straight line between their neighbours',)
-    return _Admitted(log._replace(signals=signals, sliding=_sliding(log.sliding, options)), texts * (count > 0))
+    return log._replace(signals=signals), texts * (count > 0)
 
 
 def _from_the_first(temperature: FloatArray) -> FloatArray:
     """A temperature that holds before its first message, too: a sensor of 1 Hz comes after the first samples."""
-    finite = np.flatnonzero(np.isfinite(temperature))
-    if len(finite):
-        temperature[: finite[0]] = temperature[finite[0]]
-    return temperature
+    known = np.isfinite(temperature)
+    first = int(np.argmax(known))
+    return np.concatenate((np.full(first, temperature[first]), temperature[first:]))
 
 
 def _placeholder_remarks(each: Sequence[Source]) -> Iterator[str]:

@@ -526,7 +526,7 @@ def test_a_fit_close_to_its_start_gives_the_same():
     readings = swept(values, law, scatter=2.0, n=600)
     found = fit(law, readings)
     near = {name: 1.05 * value for name, value in found.values.items()}
-    assert fit(law, readings, near, is_close=True).values == pytest.approx(found.values, rel=1e-4)
+    assert fit(law, readings, near).values == pytest.approx(found.values, rel=1e-4)
     assert fit(law, readings, {'something else': 3.0}).values == pytest.approx(found.values, rel=1e-6)
 
 
