@@ -234,11 +234,7 @@ def check_kinds(readings: FrictionReadings) -> None:
 
 
 def _check_not_by_one(readings: FrictionReadings, where: str) -> None:
-    """Check that no single group of readings tells the kinds apart: its error would be that of the division.
-
-    Raises:
-        ValueError: One does; what to measure.
-    """
+    """Check that no single group of readings tells the kinds apart: its error would be that of the division."""
     for out in readings.groups:
         if float(_multiple_correlation(pressure_sums(readings)[~out]).max()) > TOGETHER:
             a, b = (readings.chamber_pressures[out].mean(axis=0) / BAR).tolist()

@@ -15,22 +15,8 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.units import UNITS, ZEROS
-from seal_friction_ros.core.identification.admission import (
-    BEYOND_LOAD,
-    NOT_FINITE,
-    SAME_STAMP,
-    bridged,
-    check_admitted,
-    in_order,
-)
+from seal_friction_ros.core.identification import admission, load_over_position
 from seal_friction_ros.core.identification.force_correction import ForceCorrection
-from seal_friction_ros.core.identification.load_over_position import (
-    LoadOverPosition,
-    fit_load,
-    follows_position,
-    known_acceleration,
-    without_load,
-)
 from seal_friction_ros.core.identification.prepare_readings import prepare_logs, prepare_manual_readings
 from seal_friction_ros.core.identification.readings import ManualReadings, PreparedReadings, RecordedLog, check_clipping
 from seal_friction_ros.core.identification.seal_kinds import AreaErrors
@@ -85,7 +71,7 @@ class Source(NamedTuple):
     pressure_area: float | None = None  # by which the rig file turns pressure into force [m^2]; None if unknown
     remarks: tuple[str, ...] = ()  # assumptions that neither the source nor an option states
     load_position: FloatArray | None = None  # [m] of each sample, if the force sum holds a load that follows it
-    load: LoadOverPosition | None = None  # the load that was taken out of the force sum of the log
+    load: load_over_position.LoadOverPosition | None = None  # the load that was taken out of the force sum of the log
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,15 +208,15 @@ def without_load_of(source: Source, chambers: Sequence[str], options: SourceOpti
         return source
     name, signals, sliding, temperature, position, dropped = source.log
     try:
-        load = fit_load(signals, source.load_position, chambers, sliding)
+        load = load_over_position.fit_load(signals, source.load_position, chambers, sliding)
     except ValueError as error:
         raise ValueError(f'{name}: {error}') from None
-    cleaned = without_load(signals, source.load_position, load, sliding)
+    cleaned = load_over_position.without_load(signals, source.load_position, load, sliding)
     texts = tuple(f'{name}: {text}' for text in (load_text(load), *load.warnings))
-    dropped = {**dropped, BEYOND_LOAD: len(signals.time) - len(cleaned.time)}
+    dropped = {**dropped, admission.BEYOND_LOAD: len(signals.time) - len(cleaned.time)}
     if options.largest_acceleration is None:
-        limit = min(max(sliding.largest_acceleration, known_acceleration(load)), LARGEST_ACCELERATION)
-        sliding = replace(sliding, largest_acceleration=limit)
+        known = max(sliding.largest_acceleration, load_over_position.known_acceleration(load))
+        sliding = replace(sliding, largest_acceleration=min(known, LARGEST_ACCELERATION))
     return source._replace(
         log=RecordedLog(name, cleaned, sliding, temperature, position, dropped),
         load=load,
@@ -269,7 +255,7 @@ def _read_log(path: Path, options: SourceOptions) -> Source:
     source = Source(_data_file(path), None, recorded, pressure_area=_pressure_area(rig), remarks=remarks)
     if log.position is None or rig.load == 'none':
         return source
-    holds = rig.load == 'position' or follows_position(signals, log.position, sliding)
+    holds = rig.load == 'position' or load_over_position.follows_position(signals, log.position, sliding)
     return source._replace(load_position=log.position) if holds else source
 
 
@@ -284,9 +270,6 @@ def _recognised(path: Path) -> tuple[Rig, tuple[str, ...]]:
     """The one rig of config/rigs that can read a log, and a remark on that assumption.
 
     A rig whose columns are found by name is preferred to one whose columns are found by number.
-
-    Raises:
-        ValueError: No rig can read it, or several can.
     """
     folder = share_directory('seal_friction_ros', __file__) / 'config' / 'rigs'
     found: dict[str, Rig] = {}
@@ -322,12 +305,12 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
         holds_load = configuration.parameters().estimator.force_sum_correction.contains_load
         has_placeholder, chambers = configuration.has_placeholder, configuration.selection.seal_chambers
         document = None if has_placeholder else configuration.seal_documents[0]
-    order = in_order(stamp, received)
+    order = admission.in_order(stamp, received)
     columns[~(np.abs(columns) < 1e15)] = np.nan  # [SI] no measurement is as large
     columns = columns[:, order.rows]
     temperature = _from_the_first(columns[5] + ZEROS['degC']) if topics.temperature else None
     position = columns[4] if topics.position else None
-    dropped = {SAME_STAMP: order.same_stamp} if order.same_stamp else {}
+    dropped = {admission.SAME_STAMP: order.same_stamp} if order.same_stamp else {}
     signals, sliding = Signals(order.seconds, *columns[:4]), _sliding(Sliding(), options)
     log, texts = _admitted(RecordedLog(bag.name, signals, sliding, temperature, position, dropped))
     return Source(
@@ -342,16 +325,13 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
 
 
 def _admitted(log: RecordedLog) -> tuple[RecordedLog, tuple[str, ...]]:
-    """The log with single missing values bridged, and remarks on it.
-
-    Raises:
-        ValueError: Too many samples are faulty.
-    """
-    columns, masks = zip(*(bridged(column) for column in log.signals[1:]), strict=True)
+    """The log with single missing values bridged, and remarks on it."""
+    columns, masks = zip(*(admission.bridged(column) for column in log.signals[1:]), strict=True)
     count = int(np.logical_or.reduce(masks).sum())
     signals = Signals(log.signals.time, *columns)
     missing = int((~np.isfinite(np.array(columns)).all(axis=0)).sum())
-    check_admitted(log.name, len(signals.time) + sum(log.dropped.values()), {**log.dropped, NOT_FINITE: missing})
+    total, faulty = len(signals.time) + sum(log.dropped.values()), {**log.dropped, admission.NOT_FINITE: missing}
+    admission.check_admitted(log.name, total, faulty)
     texts = (f'{log.name}: {count} samples had no value, and are on a straight line between their neighbours',)
     return log._replace(signals=signals), texts * (count > 0)
 
