@@ -20,7 +20,7 @@ from seal_friction_ros.core.identification.candidate_laws import (
     candidate_laws,
 )
 from seal_friction_ros.core.identification.fitting import fit, offsets_of
-from seal_friction_ros.core.identification.readings import FrictionReadings, has_pressures
+from seal_friction_ros.core.identification.readings import FrictionReadings, contiguous_parts, has_pressures
 from seal_friction_ros.core.identification.validation import deviations_in_std, deviations_of_left_out
 
 NOMINAL = np.round(np.arange(0.10, 0.995, 0.01), 2)  # [-] nominal shares (our choice)
@@ -114,7 +114,9 @@ def within_run(law: CandidateLaw, run: FrictionReadings, near: ParameterValues) 
         (name,) = (parameter.name for parameter in constant.parameters)
         found, groups = [np.empty(0)], 0
         for inside in run.levels.values():
-            level = _in_parts(run.taken(inside))
+            of_level = run.taken(inside)
+            sides = contiguous_parts(PARTS, of_level.at.direction.astype(np.int64))
+            level = replace(of_level, group=sides, left_out_by='block')
             if level.count < 2 * PARTS:
                 continue
             typical = float(np.abs(level.force).mean()) / level.at.pressure.shape[1]
@@ -125,15 +127,6 @@ def within_run(law: CandidateLaw, run: FrictionReadings, near: ParameterValues) 
     if len(divided.groups) < 2:
         return np.empty(0), 0
     return deviations_of_left_out(law, divided, near), len(divided.groups)
-
-
-def _in_parts(readings: FrictionReadings) -> FrictionReadings:
-    """Readings with `PARTS` contiguous parts in each direction as groups."""
-    group = np.zeros(readings.count, dtype=np.int64)
-    for side in (-1.0, 1.0):
-        index = np.flatnonzero(readings.at.direction == side)
-        group[index] = np.arange(len(index)) * PARTS // max(len(index), 1)
-    return replace(readings, group=group, left_out_by='block')
 
 
 def between_runs(
@@ -155,6 +148,6 @@ def between_runs(
             return deviations_in_std(law, others, left_out, near)
     in_addition = run_to_run
     if in_addition is None:
-        friction = fit(law, others, near, is_close=True).friction(others.at)
+        friction = fit(law, others, near).friction(others.at)
         in_addition = runs.between_runs(others, friction, offsets_of(others, friction)).of_band
     return deviations_in_std(law, others, left_out, near, in_addition)

@@ -72,7 +72,7 @@ def collinear_regressors(readings: FrictionReadings, chamber_pressures: FloatArr
     ):
         both = np.array([x, y])
         if not readings.are_samples:
-            both = np.array([[column[inside].mean() for inside in readings.levels.values()] for column in both])
+            both = readings.level_means(both.T).T
         varied = np.ptp(both, axis=1) > 1e-3 * np.abs(both).max(axis=1)
         if both.shape[1] < 3 or not varied.all():
             continue
@@ -109,12 +109,12 @@ def outlying_level(laws: Sequence[CandidateLaw], readings: FrictionReadings, flo
     """
     if len(readings.levels) < 4:
         return None
-    measured = np.array([readings.half_range(inside).friction for inside in readings.levels.values()])
+    measured = readings.half_ranges[0]
     found: list[Outlier] = []
     for index, (level, out) in enumerate(readings.levels.items()):
         trained = readings.taken(~out)
         fits = [fit(law, trained) for law in laws]
-        expectations = [_level_means(each, readings) for each in fits]
+        expectations = [readings.level_means(each.friction(readings.at)) for each in fits]
         deviations = [measured / np.where(e > 0.0, e, np.inf) - 1.0 for e in expectations]
         rests = [(e > 0.0) & (np.arange(len(e)) != index) for e in expectations]
         errors = [math.hypot(*d[rest]) if rest.any() else math.inf for d, rest in zip(deviations, rests, strict=True)]
@@ -132,17 +132,10 @@ def outlying_level(laws: Sequence[CandidateLaw], readings: FrictionReadings, flo
     return worst if worst is not None and worst.standard_deviations > OUTLIER else None
 
 
-def _level_means(found: LawFit, readings: FrictionReadings) -> FloatArray:
-    """Mean friction of a law at each pressure level [N], shape (levels,)."""
-    friction = found.friction(readings.at)
-    return np.array([friction[inside].mean() for inside in readings.levels.values()])
-
-
 def _relative_slopes(found: LawFit, readings: FrictionReadings, means: FloatArray) -> FloatArray:
     """Relative change of ``means`` > 0 by a relative change of each parameter, shape (levels, parameters)."""
-    each = slopes(found.law, found.values, readings.at)
     sizes = np.array([abs(found.values[p.name]) or 1.0 for p in found.law.parameters])
-    of_levels = np.array([each[inside].mean(axis=0) for inside in readings.levels.values()])
+    of_levels = readings.level_means(slopes(found.law, found.values, readings.at))
     return np.asarray(of_levels * sizes / np.where(means > 0.0, means, np.inf)[:, np.newaxis])
 
 

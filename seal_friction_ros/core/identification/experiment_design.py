@@ -7,7 +7,7 @@ each time the one that reduces the variance most. How much the laws that are not
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple
@@ -92,12 +92,16 @@ class ExperimentDesign:
     @property
     def limit(self) -> str:
         """What limits the band: the largest of its parts."""
-        return max(self.parts, key=lambda part: self.parts[part])
+        return _largest(self.parts)
 
     @property
     def shrink(self) -> float:
         """Standard error of the law with all proposed readings over that without them [-]."""
         return self.error_after / self.error_before
+
+
+def _largest(parts: Mapping[str, float]) -> str:
+    return max(parts, key=lambda part: parts[part])
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +176,9 @@ def design_experiment(
     """
     near = laws_not_beaten(scores)
     chosen = _richest(near)
-    is_measured, at = _at_a_speed(readings)
+    at, is_measured = readings.at, bool(np.isfinite(readings.at.velocity).all())
+    if not is_measured:
+        at = at._replace(velocity=ASSUMED_SPEED * at.direction)
     speed = np.abs(at.velocity)
     is_varied = _is_speed_varied(at)
     used_speeds = _ends(speed) if is_varied else (float(np.median(speed)),)
@@ -182,9 +188,10 @@ def design_experiment(
     speeds = _grid_speeds(used_speeds)
     prior = _prior(model, *pressures, speeds)
     at_readings = model.slopes(at)
-    weighted = _without_offsets(at_readings, readings) / scatter
-    worth = _readings_worth_one(chosen, readings, scatter)
-    had = weighted.T @ weighted / worth
+    two_sided = [source for source, index in enumerate(readings.two_sided) if len(index)]
+    offsets = at.direction[:, np.newaxis] * (readings.source[:, np.newaxis] == two_sided)
+    had = _without_offsets(_information(at_readings, offsets, readings.scale * scatter), len(model.law.parameters))
+    had = had / _readings_worth_one(chosen, readings, scatter)
 
     range_slopes = _relative_slopes(model, pressures, speeds)
     relative = at_readings / model.friction(at)[:, np.newaxis]
@@ -192,19 +199,17 @@ def design_experiment(
     before = _error(range_slopes, had + prior)
     law_error = _error(identified_slopes, had + prior)
     parts = {RUN_TO_RUN: of_band, LAW: law_error, SCATTER: scatter}
-    is_limited_by_runs = max(parts, key=lambda part: parts[part]) == RUN_TO_RUN
+    is_limited_by_runs = _largest(parts) == RUN_TO_RUN
 
     repeats = _levels(readings, speed) if is_limited_by_runs else []
     grid = [point for point in _grid(identified[1], speeds) if point not in repeats]
     more = [] if is_limited_by_runs and is_varied else grid
     points, errors, information = _greedy(model, range_slopes, had + prior, scatter, repeats, more, count)
     freedom = 1 if readings.are_samples else len(readings.levels)
-    names = [parameter.name for parameter in model.law.parameters]
-    correlations = _correlated_pair(names, had + prior, had + prior + information)
-    disagreements = _disagreements(near, model, points)
+    correlations = _correlated_pair(model.law, had + prior, had + prior + information)
     proposed = tuple(
-        ProposedReading(*point, DIRECTIONS, error / before, disagreement, number < len(repeats))
-        for number, (point, error, disagreement) in enumerate(zip(points, errors, disagreements, strict=True))
+        ProposedReading(*point, DIRECTIONS, error / before, _disagreement(near, model, point), number < len(repeats))
+        for number, (point, error) in enumerate(zip(points, errors, strict=True))
     )
     return ExperimentDesign(
         law=model.law,
@@ -254,12 +259,14 @@ def _richest(near: Sequence[LawScore]) -> LawScore:
 
     A law with a parameter at its upper bound does not count where there are others.
     """
-    inside = [score for score in near if not _is_at_upper_bound(score.fit)]
-    return min(inside or near, key=lambda score: (-len(score.law.parameters), score.mean_loss))
 
+    def is_inside(fit: LawFit) -> bool:
+        return all(fit.values[p.name] <= p.upper - 1e-6 * (p.upper - p.lower) for p in fit.law.parameters)
 
-def _is_at_upper_bound(fit: LawFit) -> bool:
-    return any(fit.values[p.name] > p.upper - 1e-6 * (p.upper - p.lower) for p in fit.law.parameters)
+    return min(
+        [score for score in near if is_inside(score.fit)] or near,
+        key=lambda score: (-len(score.law.parameters), score.mean_loss),
+    )
 
 
 def _model(score: LawScore, readings: FrictionReadings, at: OperatingConditions) -> _Model:
@@ -287,15 +294,16 @@ def _scatter(score: LawScore, readings: FrictionReadings) -> float:
     return max(math.sqrt(float(np.sum(deviation**2)) / max(freedom, 1)), SMALLEST_SCATTER)
 
 
-def _without_offsets(slopes: FloatArray, readings: FrictionReadings) -> FloatArray:
-    """Derivatives of the weighted deviations, with the offset of each source in both directions eliminated."""
-    rows = slopes / readings.scale[:, np.newaxis]
-    column = readings.at.direction / readings.scale
-    for index in readings.two_sided:
-        if len(index):
-            h = column[index]
-            rows[index] -= np.outer(h, h @ rows[index]) / float(h @ h)
-    return np.asarray(rows)
+def _information(slopes: FloatArray, offsets: FloatArray, scale: FloatArray) -> FloatArray:
+    """Information of readings with the standard deviations ``scale`` [N] on the parameters, the offsets last."""
+    rows = np.column_stack((slopes, offsets)) / scale[:, np.newaxis]
+    return np.asarray(rows.T @ rows)
+
+
+def _without_offsets(information: FloatArray, count: int) -> FloatArray:
+    r"""Information on ``count`` parameters, the offsets in the last rows eliminated: :math:`A - B\,C^{-1} B^T`."""
+    mixed = information[:count, count:]
+    return np.asarray(information[:count, :count] - mixed @ np.linalg.pinv(information[count:, count:]) @ mixed.T)
 
 
 def _readings_worth_one(score: LawScore, readings: FrictionReadings, scatter: float) -> float:
@@ -372,12 +380,15 @@ def _prior(model: _Model, low: float, high: float, speeds: Sequence[float]) -> F
     return np.diag((np.maximum(strongest, 1e-12) / PRIOR_CHANGE) ** 2)
 
 
+def _covariance(information: FloatArray) -> FloatArray:
+    """Covariance of the parameters."""
+    sizes = np.sqrt(np.outer(np.diag(information), np.diag(information)))
+    return np.asarray(np.linalg.pinv(information / sizes, hermitian=True) / sizes)
+
+
 def _error(slopes: FloatArray, information: FloatArray) -> float:
     """Relative standard error of the law, root mean square over the points of ``slopes``."""
-    size = np.sqrt(np.diag(information))
-    scaled = slopes / size
-    covariance = np.linalg.pinv(information / np.outer(size, size), hermitian=True)
-    return math.sqrt(float(np.mean(np.sum((scaled @ covariance) * scaled, axis=1))))
+    return math.sqrt(float(np.mean(np.sum((slopes @ _covariance(information)) * slopes, axis=1))))
 
 
 def _greedy(
@@ -393,49 +404,33 @@ def _greedy(
 
     The points ``first`` come first, then ``count`` of the ``grid``. All are one source with one unknown offset.
     """
-    total = np.zeros((len(information) + 1, len(information) + 1))  # the offset last
+    parameters = len(information)
+    total = np.zeros((parameters + 1, parameters + 1))
     points: list[tuple[float, float]] = []
     errors: list[float] = []
-    every = [*first, *grid]
-    rows = {}
-    for point in every:
+    each = {}
+    for point in (*first, *grid):
         at = model.conditions([point])
-        weight = model.scale(at) * scatter
-        derivatives = np.column_stack((model.slopes(at), at.direction)) / weight[:, np.newaxis]
-        rows[point] = derivatives.T @ derivatives
+        each[point] = _information(model.slopes(at), at.direction, model.scale(at) * scatter)
 
     def error_with(point: tuple[float, float]) -> float:
-        return _error(range_slopes, information + _without_offset(total + rows[point]))
+        """Rounded, so that a tie goes to the first of the grid."""
+        more = _without_offsets(total + each[point], parameters)
+        return float(f'{_error(range_slopes, information + more):.9g}')
 
     for number in range(len(first) + min(count, len(grid))):
         open_points = [first[number]] if number < len(first) else [p for p in grid if p not in points]
-        found = [float(f'{error_with(point):.9g}') for point in open_points]  # a tie goes to the first of the grid
-        best = int(np.argmin(found))
-        total = total + rows[open_points[best]]
-        points.append(open_points[best])
-        errors.append(found[best])
-    return points, errors, _without_offset(total)
-
-
-def _without_offset(information: FloatArray) -> FloatArray:
-    r"""Information on the parameters, the offset in the last row eliminated: :math:`A - b\,b^T / c`."""
-    by_offset = information[:-1, -1]
-    return np.asarray(information[:-1, :-1] - np.outer(by_offset, by_offset) / max(information[-1, -1], 1e-300))
+        points.append(min(open_points, key=error_with))
+        errors.append(error_with(points[-1]))
+        total = total + each[points[-1]]
+    return points, errors, _without_offsets(total, parameters)
 
 
 def _correlation(information: FloatArray) -> FloatArray:
     """Correlation of the parameters, shape (parameters, parameters)."""
-    size = np.sqrt(np.diag(information))
-    covariance = np.linalg.pinv(information / np.outer(size, size), hermitian=True)
+    covariance = _covariance(information)
     std = np.sqrt(np.diag(covariance))
     return np.asarray(covariance / np.outer(std, std))
-
-
-def _at_a_speed(readings: FrictionReadings) -> tuple[bool, OperatingConditions]:
-    """Whether the speed of every reading was measured; the conditions of the readings, else at `ASSUMED_SPEED`."""
-    if np.isfinite(readings.at.velocity).all():
-        return True, readings.at
-    return False, readings.at._replace(velocity=ASSUMED_SPEED * readings.at.direction)
 
 
 def _pressure_ranges(readings: FrictionReadings) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -444,20 +439,16 @@ def _pressure_ranges(readings: FrictionReadings) -> tuple[tuple[float, float], t
     return (low, high), (low if are_far_apart(np.array([low, high])) else 0.0, high)
 
 
-def _correlated_pair(names: Sequence[str], before: FloatArray, after: FloatArray) -> list[CorrelatedPair | None]:
-    """The pair of `_broken_pair` with its correlation by the information before, and after; None for one parameter."""
-    pair = _broken_pair(before, after)
-    return [
-        None if pair is None else CorrelatedPair(names[pair[0]], names[pair[1]], float(_correlation(m)[pair]))
-        for m in (before, after)
-    ]
+def _correlated_pair(law: CandidateLaw, before: FloatArray, after: FloatArray) -> list[CorrelatedPair | None]:
+    """The two parameters whose correlation r falls most from one information to the other, with both correlations.
 
-
-def _broken_pair(before: FloatArray, after: FloatArray) -> tuple[int, int] | None:
-    """The two parameters whose correlation r falls most, by 1 / (1 - r^2) (variance inflation); None for one."""
-    inflation = [-np.log(np.maximum(1.0 - _correlation(m) ** 2, 1e-16)) for m in (before, after)]
-    fall = inflation[0] - inflation[1]
-    return max(combinations(range(len(before)), 2), key=lambda pair: float(fall[pair]), default=None)
+    It falls by that of 1 / (1 - r^2), the variance inflation. None for one parameter.
+    """
+    both = [_correlation(information) for information in (before, after)]
+    inflation = [-np.log(np.maximum(1.0 - each**2, 1e-16)) for each in both]
+    fall, names = inflation[0] - inflation[1], [parameter.name for parameter in law.parameters]
+    pair = max(combinations(range(len(names)), 2), key=lambda pair: float(fall[pair]), default=None)
+    return [pair and CorrelatedPair(names[pair[0]], names[pair[1]], float(each[pair])) for each in both]
 
 
 def _condition(information: FloatArray) -> float:
@@ -471,12 +462,9 @@ def _condition(information: FloatArray) -> float:
     return math.sqrt(float(values[-1] / values[0]))
 
 
-def _disagreements(near: Sequence[LawScore], model: _Model, points: Sequence[tuple[float, float]]) -> list[float]:
-    """Largest difference of the laws at each point over their mean [-]."""
-    if not points:
-        return []
-    at = model.conditions(points)
+def _disagreement(near: Sequence[LawScore], model: _Model, point: tuple[float, float]) -> float:
+    """Largest difference of the laws at a point over their mean [-]."""
+    at = model.conditions([point])
     frictions = np.array([score.fit.friction(at) for score in near])
     mean = np.maximum(frictions.mean(axis=0), 0.05 * model.mean)
-    spread = np.ptp(frictions, axis=0) / mean
-    return [float(value) for value in spread.reshape(-1, len(DIRECTIONS)).max(axis=1)]
+    return float((np.ptp(frictions, axis=0) / mean).max())

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares, nnls
@@ -25,7 +24,6 @@ LINEAR = {
     'viscous_friction',
 }
 """Parameters in which a law is linear, where all its parameters are of them."""
-_START_FACTORS = (0.2, 1.0, 4.0)  # on the first guess of the Stribeck velocity, each the start of a fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,11 +53,13 @@ class LawFit:
 
         A lower bound of 0 is a term that the data do not show, which is sound.
         """
-        for parameter in () if self.model is not None else self.law.parameters:
+        if self.model is not None:
+            return ''
+        for parameter in self.law.parameters:
             value, margin = self.values[parameter.name], 1e-6 * (parameter.upper - parameter.lower)
             if value > parameter.upper - margin or (parameter.lower != 0.0 and value < parameter.lower + margin):
                 return f'{parameter.name} is at its bound of {value:.3g}'
-        if self.model is None and not self.condition_number <= ILL_CONDITIONED:
+        if not self.condition_number <= ILL_CONDITIONED:
             return f'ill-conditioned: condition number {self.condition_number:.0f} (good below {ILL_CONDITIONED:.0f})'
         return ''
 
@@ -93,14 +93,10 @@ def fit(
     law: CandidateLaw,
     readings: FrictionReadings,
     start_values: ParameterValues | None = None,
-    *,
-    is_close: bool = False,
 ) -> LawFit:
     """Least-squares fit of a law, with one offset of the force sum for each source.
 
-    The offsets are linear and are eliminated. The sum of squares has local minima over the Stribeck velocity: the fit
-    starts from several velocities and the best result counts. ``start_values`` are those of a simpler law or of
-    similar readings; if ``is_close``, they are complete and near the result, and the fit starts from them alone.
+    The offsets are linear and are eliminated. ``start_values`` are those of a simpler law or of similar readings.
 
     Raises:
         ValueError: The result is not finite.
@@ -119,14 +115,9 @@ def fit(
     typical = readings.at.typical(mean_friction)
     first_guess = {p.name: p.start(typical) for p in law.parameters}
     start = first_guess | {name: value for name, value in (start_values or {}).items() if name in first_guess}
-    best: Any = None
-    for factor in (1.0,) if is_close or 'stribeck_velocity' not in start else _START_FACTORS:
-        guess = [value * (factor if name == 'stribeck_velocity' else 1.0) for name, value in start.items()]
-        inside = np.clip(guess, lower, upper)
-        size = np.maximum(np.abs(inside), 1e-3 * np.minimum(upper, 1.0))
-        found = least_squares(residuals, inside, bounds=(lower, upper), x_scale=size, xtol=1e-9, ftol=1e-9, gtol=1e-9)
-        if best is None or found.cost < best.cost * (1.0 - 1e-9):
-            best = found
+    inside = np.clip(list(start.values()), lower, upper)
+    size = np.maximum(np.abs(inside), 1e-3 * np.minimum(upper, 1.0))
+    best = least_squares(residuals, inside, bounds=(lower, upper), x_scale=size, xtol=1e-9, ftol=1e-9, gtol=1e-9)
     if not np.isfinite(best.x).all():
         raise ValueError(f'{law.name}: the result of the fit is not finite')
     at_zero = (lower == 0.0) & (np.abs(best.x) < 1e-6 * np.abs(list(first_guess.values())))
@@ -138,16 +129,11 @@ def _fit_with_prior(law: CandidateLaw, readings: FrictionReadings) -> LawFit:
     """As `fit`, for a law of all terms: the most probable one."""
     terms, seals = law.velocity_terms, readings.at.pressure.shape[1]
     told = Told('viscous_friction' in terms, 'stribeck_friction' in terms, 'asymmetry' in terms, areas=False)
-    model = fit_model(readings, columns_of_seals(law, seals), told)
+    columns = [columns_of(law.kinds, number) for number in range(len(law.kinds))]
+    columns = columns or [slice(None)] * law.depends_on_pressure
+    model = fit_model(readings, columns, told)
     values = values_of_model(law, model, seals)
     return LawFit(law, values, model.offsets, slopes(law, values, readings.at) / readings.scale[:, np.newaxis], model)
-
-
-def columns_of_seals(law: CandidateLaw, seals: int) -> list[tuple[int, ...]]:
-    """Seals of each kind, as columns of the pressures; empty for a law without pressure."""
-    if law.kinds:
-        return [tuple(range(seals)[columns_of(law.kinds, number)]) for number in range(len(law.kinds))]
-    return [tuple(range(seals))] if law.depends_on_pressure else []
 
 
 def values_of_model(law: CandidateLaw, model: ModelFit, seals: int) -> dict[str, float]:

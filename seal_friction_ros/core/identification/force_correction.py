@@ -50,8 +50,8 @@ def force_correction(prepared: PreparedReadings) -> ForceCorrection | None:
     if np.count_nonzero(spans > NARROWEST_PRESSURES) != 1:
         return None
     number = int(np.argmax(spans))
-    pressure = np.array([prepared.chamber_pressures[inside, number].mean() for inside in levels.values()])
-    friction, offset = np.array([readings.half_range(inside) for inside in levels.values()]).T
+    pressure = readings.level_means(prepared.chamber_pressures[:, number])
+    friction, offset = readings.half_ranges
     line = offset_line(pressure, offset)
     freedom = len(levels) - 2
     spread = float(np.sum((pressure - pressure.mean()) ** 2))

@@ -22,7 +22,7 @@ import numpy as np
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
-from seal_friction_ros.core.identification.readings import FrictionReadings
+from seal_friction_ros.core.identification.readings import FrictionReadings, numbered
 
 # Priors: mean, standard deviation, lower and upper bound. A share is one of the mean friction.
 FRICTION_PRIOR = (0.0, 10.0, 0.0, 100.0)  # [-] share: f_0, and the rise of each kind at its mean pressure
@@ -38,7 +38,6 @@ CLUSTER_FREEDOM = 1.0  # with this weight
 NOTHING = 1e-6  # [-] share that counts as 0
 MOST_STEPS = 100  # of a fit
 CONVERGED = 1e-9  # [-] change of the cost that ends it
-STARTS = (0.1, 0.3, 1.0)  # of v_S over the mean speed, where a fit begins
 
 
 class Told(NamedTuple):
@@ -51,37 +50,30 @@ class Told(NamedTuple):
 
 
 class _Layout(NamedTuple):
-    """Where the parameters stand in a vector."""
+    """Where the parameters stand in a vector: first what friction is linear in, f_0, rises, viscous, Stribeck."""
 
-    kinds: int
-    sources: int  # with an offset
+    linear: slice
+    exponents: slice
+    speed: int  # ln v_S
+    asymmetry: int
+    areas: slice
+    offsets: slice
 
-    @property
-    def exponents(self) -> slice:
-        return slice(self.kinds + 3, 2 * self.kinds + 3)
 
-    @property
-    def speed(self) -> int:  # ln v_S
-        return 2 * self.kinds + 3
+def _layout(kinds: int) -> _Layout:
+    first = kinds + 3
+    exponents, speed = slice(first, first + kinds), first + kinds
+    return _Layout(slice(first), exponents, speed, speed + 1, slice(speed + 2, speed + 4), slice(speed + 4, None))
 
-    @property
-    def asymmetry(self) -> int:
-        return 2 * self.kinds + 4
 
-    @property
-    def areas(self) -> slice:
-        return slice(self.asymmetry + 1, self.asymmetry + 3)
-
-    @property
-    def parameters(self) -> int:
-        return 2 * self.kinds + 7 + self.sources
+Columns = tuple[int, ...] | slice
 
 
 class Problem(NamedTuple):
     """Readings in the form of the fit."""
 
     readings: FrictionReadings
-    columns: tuple[tuple[int, ...], ...]  # seals of each kind
+    columns: tuple[Columns, ...]  # seals of each kind
     size: float  # [N] mean friction
     speed: float  # [m/s] mean
     highest: FloatArray  # [Pa] pressure of chambers a and b, shape (2,)
@@ -101,7 +93,7 @@ class ModelFit:
     left: FloatArray  # weighted rest of each reading, shape (n,)
 
     @property
-    def columns(self) -> tuple[tuple[int, ...], ...]:
+    def columns(self) -> tuple[Columns, ...]:
         """Seals of each kind, as columns of the pressures."""
         return self.problem.columns
 
@@ -113,7 +105,7 @@ class ModelFit:
     @property
     def layout(self) -> '_Layout':
         """Where the parameters stand in the vector."""
-        return _Layout(len(self.columns), len(self.problem.sources))
+        return _layout(len(self.columns))
 
     @property
     def constant(self) -> float:
@@ -132,7 +124,9 @@ class ModelFit:
         A seal that is pressed harder at no pressure gains more by pressure, too: our choice. Without any rise, each
         seal has the same.
         """
-        parts = self.parts if self.parts.sum() > 0.0 else np.array([float(len(each)) for each in self.columns])
+        pressure = self.problem.readings.at.pressure
+        seals = np.array([float(pressure[:, each].shape[1]) for each in self.columns])
+        parts = self.parts if self.parts.sum() > 0.0 else seals
         return np.asarray(parts / parts.sum())
 
     @property
@@ -144,7 +138,7 @@ class ModelFit:
     def offsets(self) -> FloatArray:
         """Offset of the force sum of each source [N], shape (sources,)."""
         found = np.zeros(len(self.problem.readings.names))
-        found[self.problem.sources] = self.vector[self.layout.asymmetry + 3 :] * self.size
+        found[self.problem.sources] = self.vector[self.layout.offsets] * self.size
         return found
 
     @property
@@ -167,7 +161,7 @@ class ModelFit:
     def stribeck(self) -> tuple[float, float]:
         """Stribeck friction of all seals [N] and its speed [m/s]."""
         speed = self.problem.speed * math.exp(self.vector[self.layout.speed])
-        return float(self.vector[self.layout.kinds + 2]) * self.size, speed
+        return float(self.vector[len(self.columns) + 2]) * self.size, speed
 
     @property
     def asymmetry(self) -> float:
@@ -196,9 +190,9 @@ class ModelFit:
         return np.asarray(np.sqrt(np.einsum('ni,ij,nj->n', slopes, self.covariance[:known, :known], slopes)))
 
 
-def _power_sum(at: OperatingConditions, columns: Sequence[int], m: float) -> tuple[FloatArray, FloatArray]:
+def _power_sum(at: OperatingConditions, columns: Columns, m: float) -> tuple[FloatArray, FloatArray]:
     """Sum over seals of (P / 1 bar)^m, and its derivative by m, shape (n,) each."""
-    pressure = np.maximum(at.pressure[:, list(columns)] / BAR, 1e-9)
+    pressure = np.maximum(at.pressure[:, columns] / BAR, 1e-9)
     powers = pressure**m
     return powers.sum(axis=1), (powers * np.log(pressure)).sum(axis=1)
 
@@ -211,7 +205,7 @@ def _means(problem: Problem, exponents: Sequence[float] | FloatArray) -> list[tu
 
 def _magnitude(problem: Problem, vector: FloatArray, at: OperatingConditions) -> tuple[FloatArray, FloatArray]:
     """Friction [N], shape (n,), and its derivatives by the parameters of the friction, shape (n, parameters)."""
-    layout, size, columns = _Layout(len(problem.columns), 0), problem.size, problem.columns
+    layout, size, columns = _layout(len(problem.columns)), problem.size, problem.columns
     means, typical = _means(problem, vector[layout.exponents]), problem.speed
     speed, direction = np.nan_to_num(np.abs(at.velocity)) / typical, at.direction
     falling = math.exp(-vector[layout.speed]) * speed
@@ -221,15 +215,15 @@ def _magnitude(problem: Problem, vector: FloatArray, at: OperatingConditions) ->
         rising.append(powers / max(mean, 1e-300))
         bending.append(vector[1 + kind] * (slopes - rising[-1] * slope) / max(mean, 1e-300))
     linear = np.column_stack((np.ones(len(speed)), *rising, speed, np.exp(-falling)))
-    symmetric = linear @ vector[: linear.shape[1]]
-    by_speed = vector[layout.kinds + 2] * np.exp(-falling) * falling
+    symmetric = linear @ vector[layout.linear]
+    by_speed = vector[len(columns) + 2] * np.exp(-falling) * falling
     side = (1.0 + vector[layout.asymmetry] * direction)[:, np.newaxis]
     slopes = np.column_stack((side * np.column_stack((linear, *bending, by_speed)), direction * symmetric))
     return size * side[:, 0] * symmetric, size * slopes
 
 
 def _problem(
-    readings: FrictionReadings, columns: Sequence[tuple[int, ...]], told: Told, chamber_pressures: FloatArray | None
+    readings: FrictionReadings, columns: Sequence[Columns], told: Told, chamber_pressures: FloatArray | None
 ) -> Problem:
     two_sided = np.array([s for s, index in enumerate(readings.two_sided) if len(index)], dtype=np.int64)
     size = max(float(np.abs(readings.magnitudes(readings.offsets)).mean()), 1e-12)
@@ -251,8 +245,7 @@ def _solved(problem: Problem, weight: FloatArray, start: FloatArray) -> tuple[Fl
     """Vector, and weighted Jacobian and rest with the rows of the prior: Levenberg and Marquardt within bounds."""
     readings, prior = problem.readings, problem.prior
     at, direction = readings.at, readings.at.direction[:, np.newaxis]
-    layout = _Layout(len(problem.columns), len(problem.sources))
-    known = layout.asymmetry + 1
+    known = _layout(len(problem.columns)).asymmetry + 1
 
     def both(vector: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Weighted rest and Jacobian at a vector, the rows of the prior last."""
@@ -290,7 +283,7 @@ def _clusters(readings: FrictionReadings) -> IntArray:
     if readings.are_samples:
         turns = np.diff(readings.at.direction) != 0.0
         return np.concatenate(([0], np.cumsum(turns | (np.diff(readings.source) != 0))))
-    return np.asarray(np.unique(np.column_stack((readings.source, readings.level)), axis=0, return_inverse=True)[1])
+    return numbered(readings.source, readings.level)
 
 
 def _weights(readings: FrictionReadings, residual: FloatArray, size: float, fitted: float) -> FloatArray:
@@ -300,7 +293,7 @@ def _weights(readings: FrictionReadings, residual: FloatArray, size: float, fitt
     of a reading is that within a cluster, and as many times that between clusters as the cluster has readings. The
     latter is the geometric mean of that found, with its degrees of freedom, and of the prior (our choice).
     """
-    cluster = _clusters(readings).reshape(-1)
+    cluster = _clusters(readings)
     share = residual / np.maximum(readings.scale, 1e-3 * size)
     count = np.bincount(cluster)
     mean = np.bincount(cluster, share) / count
@@ -315,7 +308,7 @@ def _weights(readings: FrictionReadings, residual: FloatArray, size: float, fitt
 
 def fit_model(
     readings: FrictionReadings,
-    columns: Sequence[tuple[int, ...]],
+    columns: Sequence[Columns],
     told: Told,
     chamber_pressures: FloatArray | None = None,
     near: FloatArray | None = None,
@@ -330,24 +323,21 @@ def fit_model(
         near: Vector of a fit to similar readings, from which this one starts.
     """
     problem = _problem(readings, columns, told, chamber_pressures)
-    layout = _Layout(len(columns), len(problem.sources))
-    starts = [near] if near is not None and len(near) == layout.parameters else _starts(problem, layout, told)
+    vector = near if near is not None and len(near) == len(problem.prior) else _start(problem)
     weight = 1.0 / (np.maximum(readings.scale, 1e-3 * problem.size) * CLUSTER_PRIOR)
     for _ in range(2):
-        solved = (_solved(problem, weight, start) for start in starts)
-        vector, jacobian, left = min(solved, key=lambda found: float(found[2] @ found[2]))
+        vector, jacobian, left = _solved(problem, weight, vector)
         fit = _model_fit(problem, vector, jacobian, left)
-        free = problem.free @ vector[layout.asymmetry + 1 :]
+        free = problem.free @ vector[fit.layout.asymmetry + 1 :]
         residual = readings.at.direction * (readings.force - free) - fit.friction(readings.at)
-        fitted = layout.parameters - float(np.sum(np.diag(fit.covariance) / problem.prior[:, 1] ** 2))
+        fitted = len(vector) - float(np.sum(np.diag(fit.covariance) / problem.prior[:, 1] ** 2))
         weight = _weights(readings, residual, problem.size, fitted)
-        starts = [vector]
     choices = [
         _problem(readings, columns, told._replace(stribeck=falling, asymmetry=uneven), chamber_pressures)
         for falling in sorted({told.stribeck, False})
         for uneven in sorted({told.asymmetry, False})
     ]
-    found = [(each, *_solved(each, weight, starts[0])) for each in choices]
+    found = [(each, *_solved(each, weight, vector)) for each in choices]
     problem, vector, jacobian, left = max(found, key=lambda one: _evidence(*one))
     return _model_fit(problem, vector, jacobian, left)
 
@@ -365,8 +355,7 @@ def without_group(fit: ModelFit, out: BoolArray) -> ModelFit:
     step = np.linalg.lstsq(everything - rows.T @ rows, rows.T @ fit.left[out], rcond=1e-14)[0]
     vector = fit.vector.copy()
     vector[free] += step
-    linear = slice(0, len(fit.columns) + 3)
-    vector[linear] = np.maximum(vector[linear], 0.0)
+    vector[fit.layout.linear] = np.maximum(vector[fit.layout.linear], 0.0)
     vector[fit.layout.exponents] = np.clip(vector[fit.layout.exponents], *EXPONENT_PRIOR[2:])
     return replace(fit, vector=vector)
 
@@ -397,19 +386,12 @@ def _evidence(problem: Problem, _: FloatArray, jacobian: FloatArray, left: Float
     return -0.5 * float(left @ left) - 0.5 * determinant - float(np.log(problem.prior[:, 1]).sum())
 
 
-def _starts(problem: Problem, layout: _Layout, told: Told) -> list[FloatArray]:
-    start = np.zeros(layout.parameters)
-    start[: layout.kinds + 1] = 1.0 / (layout.kinds + 1)
-    start[layout.exponents] = EXPONENT_PRIOR[0]
-    start[layout.kinds + 1 : layout.kinds + 3] = 0.1
-    start[layout.speed] = STRIBECK_SPEED_PRIOR[0]
-    start[layout.asymmetry + 3 :] = problem.readings.offsets[problem.sources] / problem.size
-    found = []
-    for share in STARTS if told.stribeck else (0.3,):
-        one = start.copy()
-        one[layout.speed] = math.log(share)
-        found.append(one)
-    return found
+def _start(problem: Problem) -> FloatArray:
+    kinds, start = len(problem.columns), problem.prior[:, 0].copy()
+    start[: kinds + 1] = 1.0 / (kinds + 1)
+    start[kinds + 1 : kinds + 3] = 0.1
+    start[_layout(kinds).offsets] = problem.readings.offsets[problem.sources] / problem.size
+    return start
 
 
 def _model_fit(problem: Problem, vector: FloatArray, jacobian: FloatArray, left: FloatArray) -> ModelFit:

@@ -222,11 +222,7 @@ class _Motion(NamedTuple):
 
 
 def _strokes(signals: Signals, position: FloatArray, sliding: Sliding) -> _Motion:
-    """Motions of the log, joined to strokes: motions in one direction, one after the other, are one stroke.
-
-    Raises:
-        ValueError: There is no position, or there are too few strokes.
-    """
+    """Motions of the log, joined to strokes: motions in one direction, one after the other, are one stroke."""
     has_position = np.isfinite(position)
     if has_position.mean() < 0.99:
         raise ValueError(
@@ -263,11 +259,7 @@ def _strokes(signals: Signals, position: FloatArray, sliding: Sliding) -> _Motio
 
 
 def _shared_positions(motion: _Motion) -> tuple[float, float]:
-    """Lowest and highest position [m] of the longest part of the travel that the rod passed in both directions.
-
-    Raises:
-        ValueError: The directions share too little.
-    """
+    """Lowest and highest position [m] of the longest part of the travel that the rod passed in both directions."""
     lowest, highest = (float(f(np.concatenate(motion.places))) for f in (np.min, np.max))
     edges = np.linspace(lowest, highest, CELLS + 1)
     out, back = (np.histogram(places, edges)[0] >= 3 for places in motion.places)
@@ -535,9 +527,6 @@ def _check_same_load(model: _Model, means: _Means, load: LoadOverPosition) -> No
 
     What is left of a stroke out and the next stroke back holds the change of the load in its mean, while an error of
     the friction cancels. The offset of each pair is compared with the median of all pairs.
-
-    Raises:
-        ValueError: The load changed.
     """
     k = len(model.knots)
     of_load = model.columns[:, :k] @ load.forces

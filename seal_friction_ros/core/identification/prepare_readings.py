@@ -22,7 +22,9 @@ from seal_friction_ros.core.identification.readings import (
     check_log,
     check_manual_readings,
     check_readings,
+    contiguous_parts,
     has_pressures,
+    numbered,
 )
 from seal_friction_ros.core.identification.what_a_log_tells import free_rod
 
@@ -122,16 +124,8 @@ def with_predictable_groups(readings: FrictionReadings) -> FrictionReadings:
         readings = replace(readings, group=readings.level, left_out_by='pressure')
     if readings.left_out_by != 'pressure' or has_pressures(readings):
         return readings
-    return replace(readings, group=_parts_of_strokes(readings.source, readings.level), left_out_by='block')
-
-
-def _parts_of_strokes(source: IntArray, level: IntArray) -> IntArray:
-    """Number of the part of each stroke: `PARTS` contiguous parts for each source and pressure."""
-    part = np.zeros(len(source), dtype=np.int64)
-    for number, at in np.unique(np.column_stack((source, level)), axis=0):
-        inside = np.flatnonzero((source == number) & (level == at))
-        part[inside] = np.arange(len(inside)) * PARTS // len(inside)
-    return part
+    parts = contiguous_parts(PARTS, readings.source, readings.level)
+    return replace(readings, group=parts, left_out_by='block')
 
 
 def _breakaway(
@@ -142,11 +136,13 @@ def _breakaway(
         return None
     at, _, force, source = _columns(rows, chambers)
     level = _nearest_level(at.pressure.mean(axis=1), dynamic)
-    several = len(np.unique(source)) > 1
-    group = level if dynamic.left_out_by == 'pressure' else source if several else _parts_of_strokes(source, level)
-    found = replace(dynamic, at=at, force=force, source=source, group=group, level=level, samples=())
-    found = replace(found, temperature=_temperatures(logs, rows))
-    return replace(found, travel=np.empty(0), dwell=np.array([peak.dwell for _, peak in rows]))
+    parts = source if len(np.unique(source)) > 1 else contiguous_parts(PARTS, source, level)
+    group = level if dynamic.left_out_by == 'pressure' else parts
+    found = replace(
+        dynamic, at=at, force=force, source=source, group=group, level=level, samples=(), travel=np.empty(0)
+    )
+    dwell = np.array([peak.dwell for _, peak in rows])
+    return replace(found, temperature=_temperatures(logs, rows), dwell=dwell)
 
 
 def _groups(level: IntArray, part: IntArray, kind: str) -> tuple[IntArray, str]:
@@ -241,8 +237,7 @@ def _joined(sources: Sequence[ManualReadings], seals: int) -> FrictionReadings:
     of_seals = np.repeat(np.maximum(pressure, 0.0)[:, np.newaxis], seals, axis=1)
     source = np.repeat(np.arange(len(sources)), [len(manual.friction) for manual in sources])
     level = signal_preparation.pressure_levels(of_seals[:, 0])
-    tests = np.unique(np.column_stack((source, test)), axis=0, return_inverse=True)[1].reshape(-1)
-    group, by = _groups(level, tests, 'test')
+    group, by = _groups(level, numbered(source, test), 'test')
     at = OperatingConditions(of_seals, None, direction * velocity, direction.astype(np.float64))
     readings = FrictionReadings(at, direction * friction, source, group, level, names, by, are_samples=False)
     if all(dwell is not None for dwell in dwells):

@@ -284,11 +284,7 @@ def _standard_errors(solution: _Solution, samples: _Samples) -> FloatArray:
 
 
 def _checked_starts(curves: Sequence[ReversalCurve], names: Sequence[str], fewest: int) -> list[tuple[float, float]]:
-    """Sliding friction and offset of each log [N] from the ends of its curves.
-
-    Raises:
-        PreslidingRefusedError: A log has too few reversals, reversals of one kind only, or signs that cannot be.
-    """
+    """Sliding friction and offset of each log [N] from the ends of its curves."""
     starts = []
     for number, name in enumerate(names):
         own = [curve for curve in curves if curve.log == number and len(curve.friction)]

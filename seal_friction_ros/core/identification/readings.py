@@ -105,7 +105,17 @@ class FrictionReadings:
     @property
     def level_pressures(self) -> FloatArray:
         """Mean pressure of each level [Pa, gauge], shape (levels,)."""
-        return np.array([self.seal_pressure[inside].mean() for inside in self.levels.values()])
+        return self.level_means(self.seal_pressure)
+
+    def level_means(self, values: FloatArray) -> FloatArray:
+        """Mean of ``values``, shape (n, ...), at each level, shape (levels, ...)."""
+        return np.array([values[inside].mean(axis=0) for inside in self.levels.values()])
+
+    @cached_property
+    def half_ranges(self) -> tuple[FloatArray, FloatArray]:
+        """Friction and offset of each level [N], shape (levels,) each."""
+        friction, offset = np.array([self.half_range(inside) for inside in self.levels.values()]).reshape(-1, 2).T
+        return friction, offset
 
     @cached_property
     def groups(self) -> list[BoolArray]:
@@ -185,6 +195,13 @@ class FrictionReadings:
             found[source] = half_range(rest[index], side, of_medians=False).offset if len(index) else 0.0
         return found
 
+    def scaled(self, share: FloatArray, offsets: FloatArray) -> 'FrictionReadings':
+        """The readings with ``share`` [-], shape (n,), of their friction; ``offsets`` of the sources [N] stay."""
+        zero = offsets[self.source]
+        rows = zip(self.samples, zero.tolist(), share.tolist(), strict=True) if self.samples else ()
+        samples = tuple(offset + one * (part - offset) for part, offset, one in rows)
+        return replace(self, force=zero + share * (self.force - zero), samples=samples)
+
     def frictions_of_sources(self, inside: BoolArray) -> dict[int, float]:
         """Source -> friction of its readings ``inside`` [N]."""
         sources = np.unique(self.source[inside])
@@ -199,10 +216,8 @@ class FrictionReadings:
         """
         if self.are_samples:
             return np.full(self.count, max(float(np.abs(self.force).mean()), 1e-12))
-        result = np.empty(self.count)
-        for inside in self.levels.values():
-            result[inside] = max(abs(self.half_range(inside).friction), 1e-12)
-        return result
+        of_levels = np.maximum(np.abs(self.half_ranges[0]), 1e-12)
+        return np.asarray(of_levels[np.searchsorted(list(self.levels), self.level)])
 
     @cached_property
     def two_sided(self) -> tuple[IntArray, ...]:
@@ -215,6 +230,20 @@ class FrictionReadings:
         """Shares of the readings of `two_sided` in the mean force of their source; their sum is 1."""
         weights = [1.0 / self.scale[index] ** 2 for index in self.two_sided]
         return tuple(each / max(each.sum(), 1e-300) for each in weights)
+
+
+def numbered(*columns: IntArray) -> IntArray:
+    """Number of each distinct row of the columns, shape (n,) each."""
+    return np.asarray(np.unique(np.column_stack(columns), axis=0, return_inverse=True)[1].reshape(-1))
+
+
+def contiguous_parts(count: int, *columns: IntArray) -> IntArray:
+    """Number of one of ``count`` contiguous parts, within the rows that are alike in all columns, shape (n,)."""
+    part, alike = np.zeros(len(columns[0]), dtype=np.int64), numbered(*columns)
+    for number in np.unique(alike):
+        inside = np.flatnonzero(alike == number)
+        part[inside] = np.arange(len(inside)) * count // len(inside)
+    return part
 
 
 class PreparedReadings(NamedTuple):
@@ -386,7 +415,7 @@ def check_readings(readings: FrictionReadings) -> None:
     """
     where = ', '.join(readings.names)
     _check_pressures(where, readings)
-    friction, offsets = np.array([readings.half_range(inside) for inside in readings.levels.values()]).T
+    friction, offsets = readings.half_ranges
     pressure = readings.level_pressures
     negative = np.flatnonzero(friction <= 0.0)
     if len(negative) > 0.2 * len(friction):

@@ -178,12 +178,8 @@ def settled_readings(readings: FrictionReadings, offsets: FloatArray) -> Settled
     share = np.ones(readings.count)
     for drift in of_runs:
         share[(readings.source == drift.source) & (readings.level == drift.level)] = drift.settled_share
-    offset = offsets[readings.source]
-    force = offset + share * (readings.force - offset)
-    rows = zip(readings.samples, offset.tolist(), share.tolist(), strict=True) if readings.samples else ()
-    settled = replace(readings, force=force, samples=tuple(zero + one * (part - zero) for part, zero, one in rows))
     unsure = np.array([drift.settled_std / drift.settled_share for drift in of_runs])
-    return SettledReadings(settled, share, root_mean_square(unsure))
+    return SettledReadings(readings.scaled(share, offsets), share, root_mean_square(unsure))
 
 
 def as_measured(found: CrossValidation, share: FloatArray) -> CrossValidation:

@@ -18,7 +18,7 @@ from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.mounting import pressures_at_seals
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions, SealKind, columns_of
 from seal_friction_ros.core.identification.friction_model import ModelFit, Told, fit_model
-from seal_friction_ros.core.identification.readings import NARROWEST_PRESSURES, FrictionReadings
+from seal_friction_ros.core.identification.readings import NARROWEST_PRESSURES, FrictionReadings, numbered
 from seal_friction_ros.core.identification.signal_preparation import Signals, held_pressures, pressure_levels
 
 TOGETHER = 0.98  # correlation of the pressures of the kinds above which they moved together (our choice)
@@ -47,7 +47,7 @@ def kinds_readings(
             inside = readings.source == source
             pressure[inside] = held_pressures(pressure[inside], readings.at.direction[inside])
         levels.append(pressure_levels(pressure))
-    condition = np.unique(np.column_stack(levels), axis=0, return_inverse=True)[1].reshape(-1)
+    condition = numbered(*levels)
     return replace(found, level=condition, group=condition, left_out_by='pressure')
 
 
@@ -67,15 +67,10 @@ def area_errors(readings: FrictionReadings, told: Told) -> AreaErrors | None:
     """Errors of the areas in the force sum, fitted together with the terms ``told``; None if no pressure swung."""
     if not (np.ptp(readings.chamber_pressures, axis=0) > NARROWEST_PRESSURES).any():
         return None
-    columns = [_columns(readings.kinds, number) for number in range(len(readings.kinds))]
+    columns = [columns_of(readings.kinds, number) for number in range(len(readings.kinds))]
     model = fit_model(readings, columns, told._replace(areas=True), readings.chamber_pressures)
     area_a, area_b = (-model.areas).tolist()
     return AreaErrors((area_a, area_b), model.surest_area > SURE_AREA)
-
-
-def _columns(kinds: Sequence[SealKind], number: int) -> tuple[int, ...]:
-    inside = columns_of(kinds, number)
-    return tuple(range(inside.start, inside.stop))
 
 
 class ToldApart(NamedTuple):
@@ -239,11 +234,7 @@ def check_kinds(readings: FrictionReadings) -> None:
 
 
 def _check_not_by_one(readings: FrictionReadings, where: str) -> None:
-    """Check that no single group of readings tells the kinds apart: its error would be that of the division.
-
-    Raises:
-        ValueError: One does; what to measure.
-    """
+    """Check that no single group of readings tells the kinds apart: its error would be that of the division."""
     for out in readings.groups:
         if float(_multiple_correlation(pressure_sums(readings)[~out]).max()) > TOGETHER:
             a, b = (readings.chamber_pressures[out].mean(axis=0) / BAR).tolist()

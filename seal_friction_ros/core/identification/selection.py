@@ -1,8 +1,8 @@
 """Choice of a law: every candidate is scored on readings left out of its fit, and the simplest that suffices is taken.
 
-Four pressures give four numbers to compare two laws by, which has no power. So whether friction rises with pressure at
-all is tested by what the strokes at one pressure repeat within. A law whose parameters the data do not determine is
-not recommended while a sound one is near.
+Four pressures give four numbers to compare two laws by, which has no power: a law that is off twice as much is beaten
+without a test, and whether friction rises with pressure at all is told by a line. A law whose parameters the data do
+not determine is not recommended while a sound one is near.
 """
 
 import math
@@ -12,16 +12,16 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import chdtrc, stdtrit
+from scipy.special import stdtrit
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.identification.candidate_laws import (
-    EXPONENTS,
     CandidateLaw,
     Variation,
     law_of_all_terms,
     with_velocity_terms,
 )
+from seal_friction_ros.core.identification.diagnostics import LEVEL_SCATTER
 from seal_friction_ros.core.identification.fitting import LawFit, fit
 from seal_friction_ros.core.identification.readings import FrictionReadings, are_far_apart, has_pressures
 from seal_friction_ros.core.identification.validation import CrossValidation, Ticks, cross_validate, predict
@@ -31,10 +31,7 @@ WORTHWHILE = 0.1  # share of its loss by which a law must be beaten (our choice)
 MANY_TIMES = 2.0  # a law whose loss is as many times that of another is beaten, however few the groups (our choice)
 BETTER = 0.05  # share of its loss by which all terms with a prior are better than the best law (our choice)
 NEAR = 2.0  # a sound law is near if its loss is at most as many times that of the best (our choice)
-RISES = 2.0  # standard errors of the rise over the pressures from which friction rises (our choice): 2 % false alarms
-OVERDISPERSED = 0.01  # probability of the residuals of a law below which pressures scatter by themselves (our choice)
-PRIOR_SCATTER = 0.05  # [-] of the friction between held pressures, expected with the weight of `PRIOR_FREEDOM`
-PRIOR_FREEDOM = 4.0  # degrees of freedom
+RISES = 2.0  # standard errors of the rise over the pressures from which friction rises (our choice)
 SPEEDS_DIFFER = 1.5  # fastest over slowest reading at one pressure, above which velocity terms are tried (our choice)
 FEWEST_PRESSURES_FOR_EXPONENT = 6  # with fewer, leaving each out in turn does not determine an exponent (our choice)
 STRATA = 3  # quantiles of speed and of pressure, whose cells of a swept log are left out in turn (our choice)
@@ -72,87 +69,16 @@ def _pressures(readings: FrictionReadings) -> int:
     return min(len(readings.levels), 2) if are_far_apart(readings.seal_pressure) else 1
 
 
-class Rise(NamedTuple):
-    """Rise of the friction from the lowest to the highest pressure."""
+def rises_over_pressures(readings: FrictionReadings) -> bool:
+    """Whether a line through the friction at three held pressures at least rises beyond what pressures scatter by.
 
-    rise: float  # [N]
-    standard_error: float  # [N]
-
-    @property
-    def is_significant(self) -> bool:
-        """Whether friction rises with pressure, beyond what readings repeat within."""
-        return self.rise > RISES * self.standard_error
-
-
-def rise_over_pressures(readings: FrictionReadings) -> Rise | None:
-    """Rise of the friction over held pressures, and its standard error from what readings repeat within.
-
-    A line through the friction at each pressure, weighted by its standard error: the relative scatter of repeated
-    readings (one source, pressure and direction) over the root of their number, which counts less if they follow each
-    other (lag-one autocorrelation). Where even the best of the power laws misses the friction by more than that, each
-    pressure also has a scatter of its own, which is estimated from the residuals of that law and the prior
-    `PRIOR_SCATTER`.
-
-    Returns:
-        None for swept logs, fewer than three pressures, and readings that were never repeated.
+    That is `RISES` standard errors of the slope, with the scatter `LEVEL_SCATTER` of the friction at each pressure.
     """
     if readings.are_samples or len(readings.levels) < 3:
-        return None
-    pressure = readings.level_pressures
-    friction = np.array([readings.half_range(inside).friction for inside in readings.levels.values()])
-    if (friction <= 0.0).any():
-        return None
-    errors = _errors_of_levels(readings, friction)
-    if errors is None:
-        return None
-    residuals = min(
-        (_line(pressure**exponent, friction, errors)[2] for exponent in EXPONENTS.values()),
-        key=lambda found: float(np.sum((found / errors) ** 2)),
-    )
-    error = errors
-    freedom = len(friction) - 2
-    if chdtrc(freedom, float(np.sum((residuals / error) ** 2))) < OVERDISPERSED:
-        squares = float(np.sum((residuals / friction) ** 2))
-        scatter = math.sqrt((PRIOR_FREEDOM * PRIOR_SCATTER**2 + squares) / (PRIOR_FREEDOM + freedom))
-        error = np.hypot(error, scatter * friction)
-    slope, slope_error, _ = _line(pressure, friction, error)
-    spanned = float(np.ptp(pressure))
-    return Rise(slope * spanned, slope_error * spanned)
-
-
-def _errors_of_levels(readings: FrictionReadings, friction: FloatArray) -> FloatArray | None:
-    """Standard error of the friction at each level [N], from repeated readings; None if nothing was repeated."""
-    squares = products = freedom = 0.0
-    counts = []
-    for inside in readings.levels.values():
-        counts.append(0)
-        for source in np.unique(readings.source[inside]):
-            for side in (-1.0, 1.0):
-                run = readings.force[inside & (readings.source == source) & (readings.at.direction == side)]
-                if len(run) < 2:
-                    continue
-                share = run / friction[len(counts) - 1]
-                share = share - share.mean()
-                squares += float(np.sum(share**2))
-                products += float(np.sum(share[1:] * share[:-1]))
-                freedom += len(run) - 1
-                counts[-1] += len(run)
-    if freedom < 2.0 or not all(counts):
-        return None
-    variance = max(squares / freedom, 1e-12)
-    correlation = min(max(products / max(squares, 1e-300), 0.0), 0.9)
-    worth = np.array(counts) * (1.0 - correlation) / (1.0 + correlation)
-    return np.asarray(friction * np.sqrt(variance / np.maximum(worth, 1.0)))
-
-
-def _line(x: FloatArray, y: FloatArray, error: FloatArray) -> tuple[float, float, FloatArray]:
-    """Weighted least-squares line: slope, its standard error, residuals."""
-    weight = error**-2
-    centred = x - np.average(x, weights=weight)
-    spread = float(np.sum(weight * centred**2))
-    slope = float(np.sum(weight * centred * y)) / spread
-    residuals = y - np.average(y, weights=weight) - slope * centred
-    return slope, spread**-0.5, np.asarray(residuals)
+        return False
+    pressure, friction = readings.level_pressures, readings.half_ranges[0]
+    centred = pressure - pressure.mean()
+    return float(centred @ friction) > RISES * LEVEL_SCATTER * float(friction.mean() * np.linalg.norm(centred))
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,12 +186,12 @@ def regroupings(readings: FrictionReadings) -> list[FrictionReadings]:
     return [replace(readings, group=group) for group in groups]
 
 
-def recommended(scores: Scores, rise: Rise | None = None) -> LawScore:
+def recommended(scores: Scores, *, rises: bool = False) -> LawScore:
     """The simplest law that the best law (smallest mean loss) does not beat.
 
-    Laws whose parameters are at a bound or ill-conditioned only compete if no sound law is `NEAR`. Where friction rises
-    significantly, a law without pressure and speed does not compete. Of laws with equally many parameters the one with
-    the smallest mean loss is taken.
+    Laws whose parameters are at a bound or ill-conditioned only compete if no sound law is `NEAR`. Where friction
+    ``rises`` (`rises_over_pressures`), a law without pressure and speed does not compete. Of laws with equally many
+    parameters the one with the smallest mean loss is taken.
 
     Raises:
         ValueError: No law was fitted.
@@ -273,9 +199,8 @@ def recommended(scores: Scores, rise: Rise | None = None) -> LawScore:
     Source: after the one-standard-error rule of [Breiman1984]_; the rest is our choice.
     """
     left = scored(scores)
-    rising = [score for score in left if score.law.depends_on_pressure or score.law.velocity_terms]
-    if rise is not None and rise.is_significant and rising:
-        left = rising
+    if rises:
+        left = [score for score in left if score.law.depends_on_pressure or score.law.velocity_terms] or left
     least = min(map(_mean_loss, left))
     sound = [score for score in left if not score.fit.why_unsound]
     if sound and min(map(_mean_loss, sound)) <= NEAR * least:
@@ -287,7 +212,7 @@ def recommended(scores: Scores, rise: Rise | None = None) -> LawScore:
         return best
     left = [score for score in left if not score.law.has_prior] or left
     best = min(left, key=_mean_loss)
-    left = [score for score in left if not is_beaten(score.losses, best.losses, many_times=rise is None)]
+    left = [score for score in left if not is_beaten(score.losses, best.losses, many_times=True)]
     fewest = min(len(score.law.parameters) for score in left)
     return min((score for score in left if len(score.law.parameters) == fewest), key=_mean_loss)
 

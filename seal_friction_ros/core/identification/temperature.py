@@ -12,7 +12,6 @@ Source: [FrischWaugh1933]_. One point a run, limits and numbers are our choice.
 """
 
 import math
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +20,7 @@ from scipy.special import stdtrit
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.friction.temperature import TemperatureScale, scale_at
-from seal_friction_ros.core.identification.readings import FrictionReadings
+from seal_friction_ros.core.identification.readings import FrictionReadings, contiguous_parts, numbered
 
 FEWEST_RUNS = 4  # for cells that reach across runs
 PARTS = 8  # contiguous parts of one run
@@ -75,7 +74,7 @@ def fit_temperature(readings: FrictionReadings) -> TemperatureFit | None:
     if readings.count < FEWEST_READINGS or float(measured.min()) <= 0.0:
         return refused('too few readings, or friction near zero: record more strokes at each temperature')
     run, part, across = _runs(readings)
-    cells = _numbered(readings.level, readings.at.direction.astype(np.int64), *(() if across else (run,)))
+    cells = numbered(readings.level, readings.at.direction.astype(np.int64), *(() if across else (run,)))
     others = _others(readings, cells, across=across)
     warmth, friction = (_means(_left(column, cells, others), part) for column in (temperature, np.log(measured)))
     if float(warmth.std()) < LEAST_SPREAD:
@@ -103,10 +102,7 @@ def at_reference(readings: FrictionReadings, found: TemperatureFit) -> FrictionR
     """Readings as they would have been at the reference temperature; offsets of the force sum stay."""
     law = found.scale
     share = 1.0 / np.array([scale_at(law, one) for one in readings.temperature.tolist()])
-    offset = readings.offsets[readings.source]
-    rows = zip(readings.samples, offset.tolist(), share.tolist(), strict=True) if readings.samples else ()
-    samples = tuple(zero + one * (part - zero) for part, zero, one in rows)
-    return replace(readings, force=offset + share * (readings.force - offset), samples=samples)
+    return readings.scaled(share, readings.offsets)
 
 
 def _runs(readings: FrictionReadings) -> tuple[IntArray, IntArray, bool]:
@@ -114,16 +110,7 @@ def _runs(readings: FrictionReadings) -> tuple[IntArray, IntArray, bool]:
     run = readings.group if readings.left_out_by == 'test' else readings.source
     if len(np.unique(run)) >= FEWEST_RUNS:
         return run, run, True
-    part = np.zeros(readings.count, np.int64)
-    for one in np.unique(run):
-        inside = np.flatnonzero(run == one)
-        part[inside] = one * PARTS + np.arange(len(inside)) * PARTS // len(inside)
-    return run, part, False
-
-
-def _numbered(*columns: IntArray) -> IntArray:
-    """Number of each distinct row."""
-    return np.asarray(np.unique(np.column_stack(columns), axis=0, return_inverse=True)[1].reshape(-1))
+    return run, run * PARTS + contiguous_parts(PARTS, run), False
 
 
 def _others(readings: FrictionReadings, cells: IntArray, *, across: bool) -> list[FloatArray]:

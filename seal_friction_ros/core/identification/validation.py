@@ -84,7 +84,7 @@ def predict(
     The offset of a source comes from ``trained``. A source that is not in ``trained`` gets its offset from its own
     readings in both directions, in which the friction cancels.
     """
-    found = fit(law, trained, near, is_close=True)
+    found = fit(law, trained, near)
     friction = found.friction(tested.at)
     signed = tested.force - tested.at.direction * friction
     offsets = tested.offsets_with_own(found.offsets, signed, trained.source)

@@ -364,11 +364,7 @@ def _readings(
 def _row_in_order(
     place: str, row: tuple[float, float], before: tuple[float, set[float]], unit: str, speed_unit: str
 ) -> tuple[float, set[float]]:
-    """Pressure of a ``row`` of pressure and speed, and the speeds there so far; ``before`` is that of the row before.
-
-    Raises:
-        ValueError: The row is out of order, or pressure and speed occur twice.
-    """
+    """Pressure of a ``row`` of pressure and speed, and the speeds there so far, as ``before`` the row."""
     (pressure, speed), (pressure_before, speeds) = row, before
     if speed_unit and not 0.0 < speed < math.inf:
         raise ValueError(f'{place}: the speed is {speed:g} {speed_unit}: give its magnitude, above 0')

@@ -6,36 +6,29 @@ from typing import Any
 import numpy as np
 
 from seal_friction_ros.core.foundation.units import BAR, MM
-from seal_friction_ros.core.identification.experiment_design import (
-    ASSUMED_SPEED,
-    LAW,
-    RUN_TO_RUN,
-    SCATTER,
-    ExperimentDesign,
-    design_experiment,
-)
+from seal_friction_ros.core.identification import experiment_design
 from seal_friction_ros.core.identification.seal_kinds import moved_together, proposed_conditions
 from seal_friction_ros.offline.identification.data_sheet import FrictionTestPlan
 from seal_friction_ros.offline.identification.results import Identification
 from seal_friction_ros.offline.work.seal_writer import rounded, rounded_numbers
 
 LIMITS = {
-    RUN_TO_RUN: 'the spread from run to run',
-    LAW: 'the standard error of the law',
-    SCATTER: 'the scatter of single readings',
+    experiment_design.RUN_TO_RUN: 'the spread from run to run',
+    experiment_design.LAW: 'the standard error of the law',
+    experiment_design.SCATTER: 'the scatter of single readings',
 }
 
 
-def design_for(found: Identification) -> ExperimentDesign:
+def design_for(found: Identification) -> experiment_design.ExperimentDesign:
     """The design of the next readings for the ladder and the readings of an identification."""
     used, quality = found.selection.readings, found.quality
     runs_are_left_out = used.left_out_by in ('test', 'file') and not quality.is_stated
     between = None if quality.is_stated or runs_are_left_out else quality.between_runs
     of_band = between.of_band if between is not None else quality.between_runs.std
-    return design_experiment(found.selection.scores, used, between, of_band)
+    return experiment_design.design_experiment(found.selection.scores, used, between, of_band)
 
 
-def plan_of(found: Identification, design: ExperimentDesign) -> FrictionTestPlan:
+def plan_of(found: Identification, design: experiment_design.ExperimentDesign) -> FrictionTestPlan:
     """Data sheet of the proposed readings, sorted by pressure and speed, in bar, mm/s and N."""
     points = [(rounded(r.pressure / BAR, 6), rounded(r.speed / MM, 6)) for r in design.readings]
     name = str(found.document['name']).replace(',', ' ')
@@ -53,7 +46,7 @@ def plan_of(found: Identification, design: ExperimentDesign) -> FrictionTestPlan
     )
 
 
-def numbers_of(design: ExperimentDesign) -> dict[str, Any]:
+def numbers_of(design: experiment_design.ExperimentDesign) -> dict[str, Any]:
     """Numbers for JSON: ``next``, the readings in the order of their use, and ``next_effect``."""
     before, after = design.correlation_before, design.correlation_after
     pair = before and after and {'parameters': [before.one, before.other], 'before': before.correlation,
@@ -115,17 +108,17 @@ def _percent(share: float) -> str:
     return f'{float(f"{100.0 * share:.2g}"):g} %'
 
 
-def texts_of(found: Identification, design: ExperimentDesign) -> Iterator[str]:
+def texts_of(found: Identification, design: experiment_design.ExperimentDesign) -> Iterator[str]:
     """What limits the band, and what the proposed readings change, one line each."""
     limit = 100.0 * design.parts[design.limit]
     yield f'{LIMITS[design.limit]} limits the band: {limit:.3g} % of the friction'
     run = design.repeated
-    if design.limit == RUN_TO_RUN and run is not None:
+    if design.limit == experiment_design.RUN_TO_RUN and run is not None:
         yield (
             f'repeat the run on another day, mounted anew: its part of the band shrinks to {100.0 * run.shrink:.0f} % '
             f'if runs differ as expected, and to {100.0 * run.shrink_at_best:.0f} % if they agree'
         )
-    elif design.limit == RUN_TO_RUN:
+    elif design.limit == experiment_design.RUN_TO_RUN:
         yield 'the spread between runs is as given with --run-to-run: several runs on other days measure it'
     low, high = (pressure / BAR for pressure in design.pressures)
     slow, fast = (speed / MM for speed in design.speeds)
@@ -142,8 +135,9 @@ def texts_of(found: Identification, design: ExperimentDesign) -> Iterator[str]:
         )
     if not design.speed_is_measured:
         yield (
-            f'the readings have no speed: {ASSUMED_SPEED / MM:g} mm/s is assumed, and the speeds are factors of it; '
-            'write down the true speeds, and those of the readings at hand, else the law gets no term of the speed'
+            f'the readings have no speed: {experiment_design.ASSUMED_SPEED / MM:g} mm/s is assumed, and the speeds are '
+            'factors of it; write down the true speeds, and those of the readings at hand, else the law gets no term '
+            'of the speed'
         )
     elif not design.speed_is_varied:
         yield 'the readings have one speed: the effect of the speed is unknown, so other speeds are among the readings'

@@ -21,7 +21,7 @@ from seal_friction_ros.core.friction.geometry import SealGeometry, squeeze_force
 from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw
 from seal_friction_ros.core.friction.laws.pressure_power_law import PressurePowerLaw
 from seal_friction_ros.core.friction.seal_file import parse_part, parse_seal
-from seal_friction_ros.core.identification import diagnostics, fitting, run_in, runs, validation
+from seal_friction_ros.core.identification import diagnostics, fitting, run_in, runs, seal_kinds, validation
 from seal_friction_ros.core.identification.breakaway import BreakawayFit, fit_breakaway
 from seal_friction_ros.core.identification.calibration import calibration
 from seal_friction_ros.core.identification.candidate_laws import (
@@ -34,16 +34,6 @@ from seal_friction_ros.core.identification.force_correction import ForceCorrecti
 from seal_friction_ros.core.identification.friction_model import Told
 from seal_friction_ros.core.identification.prepare_readings import with_predictable_groups
 from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
-from seal_friction_ros.core.identification.seal_kinds import (
-    LARGEST_KIND_ERROR,
-    AreaErrors,
-    ToldApart,
-    area_errors,
-    check_kinds,
-    check_told_apart,
-    kinds_readings,
-    told_apart,
-)
 from seal_friction_ros.core.identification.selection import (
     WORTHWHILE,
     ChosenAnew,
@@ -53,7 +43,7 @@ from seal_friction_ros.core.identification.selection import (
     choose_anew,
     collinear_spread,
     recommended,
-    rise_over_pressures,
+    rises_over_pressures,
     score_ladder,
     variation_of,
 )
@@ -92,7 +82,7 @@ class IdentifyOptions:
 
     sources: SourceOptions = field(default_factory=SourceOptions)
     kinds: tuple[SealKind, ...] = ()  # of the seals, if there are several; their chambers are those of the sources
-    largest_kind_error: float = LARGEST_KIND_ERROR  # share of its friction up to which a kind is told apart [-]
+    largest_kind_error: float = seal_kinds.LARGEST_KIND_ERROR  # [-] of its friction, up to which a kind is told apart
     seal: str | None = None
     """seal file with the geometry of the ring and its normal force: a path, or the name of one in config/seals"""
     squeeze_force: bool = False  # compute the normal force from the geometry, even if the seal file has one
@@ -161,7 +151,7 @@ def gather(paths: Sequence[Place], options: IdentifyOptions, workers: Workers = 
     ring = _ring(sources, options)
     prepared = _prepared(sources, kinds)
     _check_one_seal(diagnostics.shared_levels(prepared.readings), options.refuse_changed)
-    correction = _force_correction(prepared, sources.has_fitted_load)
+    correction = _correction(prepared, sources.has_fitted_load)
     if correction is not None and correction.is_significant:
         sources = sources.corrected(correction)
         prepared = _prepared(sources, kinds)
@@ -186,11 +176,7 @@ def gather(paths: Sequence[Place], options: IdentifyOptions, workers: Workers = 
 
 
 def _prepared(sources: Sources, kinds: tuple[SealKind, ...]) -> PreparedReadings:
-    """Readings of all sources; of several kinds of seals with those that tell them apart.
-
-    Raises:
-        ValueError: They are unfit for identification.
-    """
+    """Readings of all sources; of several kinds of seals with those that tell them apart."""
     prepared = sources.prepare()
     if not kinds:
         return prepared
@@ -205,30 +191,26 @@ def _prepared(sources: Sources, kinds: tuple[SealKind, ...]) -> PreparedReadings
             f'{where}: nothing but friction loads the rod, so the pressures are the effect of the friction and '
             'tell no kinds apart: load the rod and record the load, or drive with several supply or return pressures'
         )
-    readings = kinds_readings(prepared.readings, prepared.chamber_pressures, kinds)
-    check_kinds(readings)
+    readings = seal_kinds.kinds_readings(prepared.readings, prepared.chamber_pressures, kinds)
+    seal_kinds.check_kinds(readings)
     return prepared._replace(readings=readings)
 
 
-def _force_correction(prepared: PreparedReadings, has_fitted_load: bool) -> ForceCorrection | AreaErrors | None:
+def _correction(prepared: PreparedReadings, has_fitted_load: bool) -> ForceCorrection | seal_kinds.AreaErrors | None:
     if not prepared.readings.kinds:
         return force_correction(prepared)
     variation = variation_of(prepared.readings)
     speeds, asymmetry = variation.speeds, variation.asymmetry and not has_fitted_load
-    return area_errors(prepared.readings, Told(speeds, speeds, asymmetry, areas=True))
+    return seal_kinds.area_errors(prepared.readings, Told(speeds, speeds, asymmetry, areas=True))
 
 
-def _told_apart(data: IdentificationData, selection: LawSelection, largest_error: float) -> ToldApart | None:
-    """How well the kinds of seals are told apart; None for one kind.
-
-    Raises:
-        ValueError: One is told worse than within ``largest_error``.
-    """
+def _told_apart(data: IdentificationData, selection: LawSelection, largest_error: float) -> seal_kinds.ToldApart | None:
+    """How well the kinds of seals are told apart; None for one kind."""
     model = selection.fit.model
     if not data.used.kinds or model is None:
         return None
-    found = told_apart(model, data.used)
-    check_told_apart(found, model, data.used, largest_error)
+    found = seal_kinds.told_apart(model, data.used)
+    seal_kinds.check_told_apart(found, model, data.used, largest_error)
     return found
 
 
@@ -263,12 +245,7 @@ def _with_normal_force(readings: FrictionReadings, ring: Ring | None) -> Frictio
 
 
 def _check_one_seal(changes: Sequence[diagnostics.RunChange], refuse_changed: bool) -> None:
-    """Check that sources may be runs of one seal.
-
-    Raises:
-        ValueError: Their friction differs by more than `runs.ANOTHER_SEAL` at most of the pressures that they share, or
-            with ``refuse_changed`` by more than `diagnostics.CHANGED` at one of them.
-    """
+    """Check that sources may be runs of one seal."""
     if not changes:
         return
     middle = float(np.median([change.ratio for change in changes]))
@@ -297,12 +274,12 @@ def select_law(
     """
     with progress('fit and leave out', len(_candidates(data.used, data.ring)) + MOST_EXTENSIONS) as advance:
         scores = _scored(data.used, data.ring, data.sources.has_fitted_load, advance)
-    best = recommended(scores, rise_over_pressures(data.used))
+    best = recommended(scores, rises=rises_over_pressures(data.used))
     settled, readings, share = _settled(data, best), data.used, np.ones(data.used.count)
     is_no_run_in = False
     if settled is not None and len(data.used.levels) >= FEWEST_TO_COMPARE:
         of_settled = _scored(settled.readings, data.ring, data.sources.has_fitted_load)
-        best_settled = recommended(of_settled, rise_over_pressures(settled.readings))
+        best_settled = recommended(of_settled, rises=rises_over_pressures(settled.readings))
         if best_settled.mean_loss <= (1.0 + WORTHWHILE) * best.mean_loss:
             scores, best, (readings, share, _) = of_settled, best_settled, settled
         else:
@@ -366,8 +343,8 @@ def _choose_anew(
 
 def _recommended(readings: FrictionReadings, ring: Ring | None, has_fitted_load: bool) -> LawScore:
     """Recommended law for the readings that are left."""
-    predictable = with_predictable_groups(readings)
-    return recommended(_scored(predictable, ring, has_fitted_load), rise_over_pressures(predictable))
+    scores = _scored(with_predictable_groups(readings), ring, has_fitted_load)
+    return recommended(scores, rises=rises_over_pressures(readings))
 
 
 def _scored(
@@ -381,9 +358,12 @@ def _scored(
 
 
 def assess(
-    data: IdentificationData, selection: LawSelection, run_to_run: float | None, kinds: ToldApart | None = None
+    data: IdentificationData,
+    selection: LawSelection,
+    run_to_run: float | None,
+    told: seal_kinds.ToldApart | None = None,
 ) -> LawQuality:
-    """Uncertainty of the selected law for readings of a new run; ``kinds`` tells how well kinds are told apart."""
+    """Uncertainty of the selected law for readings of a new run; ``told`` is how well kinds are told apart."""
     used, found, left_out = data.used, selection.fit, selection.validation
     groups = len(used.groups)
     everything = data.prepared.readings
@@ -396,7 +376,7 @@ def assess(
         between, of_band = between._replace(std=0.0), 0.0
     else:
         of_band = between.of_band
-    unseen = collinear_spread(selection.scores, found, used) if kinds is None else kinds.unseen_std
+    unseen = collinear_spread(selection.scores, found, used) if told is None else told.unseen_std
     in_addition = math.hypot(of_band, unseen)
     with progress('test the band', groups * (groups - 1)) as advance:
         coverage = validation.band_coverage(selection.law, selection.readings, found.values, advance)
@@ -407,7 +387,7 @@ def assess(
         is_stated=run_to_run is not None,
         changes=diagnostics.shared_levels(everything) + diagnostics.swept_logs_compared(used, found),
         told_apart=unseen,
-        kinds=kinds,
+        kinds=told,
         coverage=coverage,
         calibration=calibration(selection.law, selection.readings, found.values, run_to_run),
         repeatability=diagnostics.repeatability(used, found.offsets),
@@ -440,7 +420,7 @@ def _levels(
     unseen[:, 0] = selection.validation.predicted
     if selection.chosen_anew is not None:
         unseen[:, 1] = selection.chosen_anew.predicted
-    predicted = [unseen[inside].mean(axis=0).tolist() for inside in data.used.levels.values()]
+    predicted = data.used.level_means(unseen).tolist()
     if data.outlier is not None:
         predicted.insert(list(readings.levels).index(data.outlier.level), [data.outlier.expected] * 2)
     return tuple(

@@ -7,14 +7,7 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.units import MM, UM
-from seal_friction_ros.core.identification.presliding_fit import (
-    PreslidingFit,
-    PreslidingRefusedError,
-    PreslidingScore,
-    ReversalLog,
-    fit_presliding,
-    score_presliding,
-)
+from seal_friction_ros.core.identification import presliding_fit
 from seal_friction_ros.core.identification.readings import RecordedLog
 from seal_friction_ros.core.identification.signal_preparation import LONGEST_GAP, Signals
 from seal_friction_ros.offline.identification.sources import Sources
@@ -23,8 +16,8 @@ from seal_friction_ros.offline.identification.sources import Sources
 class IdentifiedPresliding(NamedTuple):
     """Elasticity of all seals together, and how well it predicts reversals that were kept back."""
 
-    fit: PreslidingFit
-    score: PreslidingScore
+    fit: presliding_fit.PreslidingFit
+    score: presliding_fit.PreslidingScore
     seals: int
 
 
@@ -36,25 +29,25 @@ def identify_presliding(sources: Sources) -> IdentifiedPresliding:
     """
     logs = [reversal_log(source.log) for source in sources.each if source.log is not None]
     if not logs:
-        raise PreslidingRefusedError(
+        raise presliding_fit.PreslidingRefusedError(
             f'{sources.files[0].name}: manual readings have no reversals: leave out --presliding, or give logs or bags'
         )
-    fit = fit_presliding(logs)
-    score = score_presliding(logs, fit.length, fit.length)
+    fit = presliding_fit.fit_presliding(logs)
+    score = presliding_fit.score_presliding(logs, fit.length, fit.length)
     if not score.elastic < score.rigid:
-        raise PreslidingRefusedError(
+        raise presliding_fit.PreslidingRefusedError(
             f'{", ".join(log.name for log in logs)}: presliding predicts the reversals kept back with an RMS error of '
             f'{score.elastic:.2g} N, no better than rigid seals with {score.rigid:.2g} N: leave out --presliding'
         )
     return IdentifiedPresliding(fit, score, len(sources.chambers))
 
 
-def reversal_log(log: RecordedLog) -> ReversalLog:
+def reversal_log(log: RecordedLog) -> presliding_fit.ReversalLog:
     """Signals of a log for the fit; without a position, the integral of the velocity."""
     signals = log.signals
     position = integrated(signals) if log.position is None else log.position
     finite = np.isfinite(position) & np.isfinite(signals.force_sum)
-    return ReversalLog(log.name, signals.time[finite], position[finite], signals.force_sum[finite])
+    return presliding_fit.ReversalLog(log.name, signals.time[finite], position[finite], signals.force_sum[finite])
 
 
 def integrated(signals: Signals) -> FloatArray:

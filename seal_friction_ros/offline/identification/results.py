@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw
@@ -326,18 +325,13 @@ def kinds_numbers(found: Identification) -> dict[str, Any]:
         'kinds': [_kind_numbers(found, fit, told, number) for number in range(len(readings.kinds))],
         **{name: shared.get(name, 0.0) for name in names},
         'correlation': told.correlation,
-        'pressure_a_Pa': _level_means(readings, readings.chamber_pressures[:, 0]),
-        'pressure_b_Pa': _level_means(readings, readings.chamber_pressures[:, 1]),
+        'pressure_a_Pa': readings.level_means(readings.chamber_pressures[:, 0]),
+        'pressure_b_Pa': readings.level_means(readings.chamber_pressures[:, 1]),
         'area_correction_m2': [lacking.get(f'area_{chamber}', 0.0) for chamber in 'ab'],
         'offset_N': fit.offsets,
         'next': [{'pressure_a_Pa': c.a, 'pressure_b_Pa': c.b} for c in conditions],
         'next_correlation': correlation,
     }
-
-
-def _level_means(readings: FrictionReadings, values: FloatArray) -> list[float]:
-    """Mean of one value per reading at each pressure level."""
-    return [float(values[inside].mean()) for inside in readings.levels.values()]
 
 
 def _kind_numbers(found: Identification, fit: fitting.LawFit, told: ToldApart, number: int) -> dict[str, Any]:
@@ -358,8 +352,8 @@ def _kind_numbers(found: Identification, fit: fitting.LawFit, told: ToldApart, n
         'share': float(told.friction[number]) / total,
         'share_std': float(told.apart_std[number]) / total,
         'pressure_correlation': float(told.together[number]),
-        'pressure_Pa': _level_means(readings, readings.at.pressure[:, columns_of(readings.kinds, number)].mean(axis=1)),
-        'fitted_N': _level_means(readings, fit.law.frictions(readings.at, fit.values)[:, number]),
+        'pressure_Pa': readings.level_means(readings.at.pressure[:, columns_of(readings.kinds, number)].mean(axis=1)),
+        'fitted_N': readings.level_means(fit.law.frictions(readings.at, fit.values)[:, number]),
     }
 
 
@@ -384,8 +378,18 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
             'correlation': selection.fit.correlation.tolist(),
             'offset_N': [level.offset for level in levels],
             'area_correction_m2': correction.area if correction else None,
-            'area_correction': correction and _correction_numbers(correction),
-            'offset_line': correction and _line_numbers(correction),
+            'area_correction': correction
+            and {
+                'chamber': correction.chamber,
+                'is_made': correction.is_significant,
+                'standard_error_m2': correction.standard_error,
+            },
+            'offset_line': correction
+            and {
+                'constant_N': correction.line.constant,
+                'area_error_m2': correction.line.area_error,
+                'rms_N': correction.line.rms,
+            },
             'between_run_std': quality.between_runs.std,
             'between_runs_measured': quality.between_runs.measured,
             'told_apart_std': quality.told_apart,
@@ -424,31 +428,17 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
 
 def _settled_numbers(settled: SettledLaw, quality: LawQuality) -> dict[str, Any]:
     """The settled seal: friction at each pressure in use, from its readings and by its law."""
-    readings, friction = settled.readings, settled.fit.friction(settled.readings.at)
-    levels = list(readings.levels.values())
-    fitted = [float(friction[inside].mean()) for inside in levels]
+    readings = settled.readings
+    fitted = readings.level_means(settled.fit.friction(readings.at))
     relative = math.hypot(quality.uncertainty.relative, settled.relative_std)
     return {
         'parameters': settled.fit.values,
         'relative_std_of_settling': settled.relative_std,
         'pressure_Pa': readings.level_pressures.tolist(),
-        'measured_N': [readings.half_range(inside).friction for inside in levels],
+        'measured_N': readings.half_ranges[0],
         'fitted_N': fitted,
-        'std_N': [math.hypot(relative * value, quality.uncertainty.absolute) for value in fitted],
+        'std_N': np.hypot(relative * fitted, quality.uncertainty.absolute),
     }
-
-
-def _correction_numbers(correction: ForceCorrection) -> dict[str, Any]:
-    return {
-        'chamber': correction.chamber,
-        'is_made': correction.is_significant,
-        'standard_error_m2': correction.standard_error,
-    }
-
-
-def _line_numbers(correction: ForceCorrection) -> dict[str, float]:
-    line = correction.line
-    return {'constant_N': line.constant, 'area_error_m2': line.area_error, 'rms_N': line.rms}
 
 
 def _breakaway_numbers(found: Identification) -> dict[str, Any]:
@@ -459,13 +449,12 @@ def _breakaway_numbers(found: Identification) -> dict[str, Any]:
     measured = readings.magnitudes(fit.offsets)
     coulomb = fit.law.coulomb_friction(readings.at, fit.values)
     fitted = coulomb * (1.0 + law.ratio) + law.stiction * readings.at.pressure.shape[1]
-    levels = readings.levels.values()
     return {
         **law._asdict(),
         'standard_errors': list(law.standard_errors),
         'pressure_Pa': rounded_numbers(readings.level_pressures),
-        'measured_N': rounded_numbers([float(measured[inside].mean()) for inside in levels]),
-        'fitted_N': rounded_numbers([float(fitted[inside].mean()) for inside in levels]),
+        'measured_N': rounded_numbers(readings.level_means(measured)),
+        'fitted_N': rounded_numbers(readings.level_means(fitted)),
     }
 
 

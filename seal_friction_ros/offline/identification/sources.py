@@ -15,22 +15,8 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.units import UNITS, ZEROS
-from seal_friction_ros.core.identification.admission import (
-    BEYOND_LOAD,
-    NOT_FINITE,
-    SAME_STAMP,
-    bridged,
-    check_admitted,
-    in_order,
-)
+from seal_friction_ros.core.identification import admission, load_over_position
 from seal_friction_ros.core.identification.force_correction import ForceCorrection
-from seal_friction_ros.core.identification.load_over_position import (
-    LoadOverPosition,
-    fit_load,
-    follows_position,
-    known_acceleration,
-    without_load,
-)
 from seal_friction_ros.core.identification.prepare_readings import prepare_logs, prepare_manual_readings
 from seal_friction_ros.core.identification.readings import ManualReadings, PreparedReadings, RecordedLog, check_clipping
 from seal_friction_ros.core.identification.seal_kinds import AreaErrors
@@ -85,7 +71,7 @@ class Source(NamedTuple):
     pressure_area: float | None = None  # by which the rig file turns pressure into force [m^2]; None if unknown
     remarks: tuple[str, ...] = ()  # assumptions that neither the source nor an option states
     load_position: FloatArray | None = None  # [m] of each sample, if the force sum holds a load that follows it
-    load: LoadOverPosition | None = None  # the load that was taken out of the force sum of the log
+    load: load_over_position.LoadOverPosition | None = None  # the load that was taken out of the force sum of the log
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,17 +92,16 @@ class Sources:
         """Whether a load over position was fitted to a log; friction larger in one direction counts as load there."""
         return any(source.load is not None for source in self.each)
 
-    def prepare(self, index: Sequence[int] | None = None) -> PreparedReadings:
-        """Readings of all sources, or of those numbered in ``index``.
+    def prepare(self) -> PreparedReadings:
+        """Readings of all sources.
 
         Raises:
             ValueError: They are unfit for identification.
         """
-        chosen = self.each if index is None else [self.each[i] for i in index]
-        logs = [source.log for source in chosen if source.log is not None]
+        logs = [source.log for source in self.each if source.log is not None]
         if logs:
             return prepare_logs(logs, self.chambers)
-        dynamic, static = zip(*(source.manual for source in chosen if source.manual is not None), strict=True)
+        dynamic, static = zip(*(source.manual for source in self.each if source.manual is not None), strict=True)
         with_static = [readings for readings in static if len(readings.friction)]
         return prepare_manual_readings(dynamic, with_static, len(self.chambers))
 
@@ -223,15 +208,15 @@ def without_load_of(source: Source, chambers: Sequence[str], options: SourceOpti
         return source
     name, signals, sliding, temperature, position, dropped = source.log
     try:
-        load = fit_load(signals, source.load_position, chambers, sliding)
+        load = load_over_position.fit_load(signals, source.load_position, chambers, sliding)
     except ValueError as error:
         raise ValueError(f'{name}: {error}') from None
-    cleaned = without_load(signals, source.load_position, load, sliding)
+    cleaned = load_over_position.without_load(signals, source.load_position, load, sliding)
     texts = tuple(f'{name}: {text}' for text in (load_text(load), *load.warnings))
-    dropped = {**dropped, BEYOND_LOAD: len(signals.time) - len(cleaned.time)}
+    dropped = {**dropped, admission.BEYOND_LOAD: len(signals.time) - len(cleaned.time)}
     if options.largest_acceleration is None:
-        limit = min(max(sliding.largest_acceleration, known_acceleration(load)), LARGEST_ACCELERATION)
-        sliding = replace(sliding, largest_acceleration=limit)
+        known = max(sliding.largest_acceleration, load_over_position.known_acceleration(load))
+        sliding = replace(sliding, largest_acceleration=min(known, LARGEST_ACCELERATION))
     return source._replace(
         log=RecordedLog(name, cleaned, sliding, temperature, position, dropped),
         load=load,
@@ -265,12 +250,12 @@ def _read_log(path: Path, options: SourceOptions) -> Source:
             check_clipping(path.name, where, column[moving] * UNITS[term.unit], is_pressure=is_pressure)
     seconds = (samples.stamp - samples.stamp[0]) * 1e-9
     signals = Signals(seconds, samples.velocity, samples.chamber_a, samples.chamber_b, samples.force_sum)
-    recorded, texts = _admitted(RecordedLog(path.name, signals, sliding, log.temperature, log.position), options)
+    recorded, texts = _admitted(RecordedLog(path.name, signals, sliding, log.temperature, log.position))
     remarks = (*remarks, *texts, *(f'{path.name}: {text}' for text in log.remarks))
     source = Source(_data_file(path), None, recorded, pressure_area=_pressure_area(rig), remarks=remarks)
     if log.position is None or rig.load == 'none':
         return source
-    holds = rig.load == 'position' or follows_position(signals, log.position, sliding)
+    holds = rig.load == 'position' or load_over_position.follows_position(signals, log.position, sliding)
     return source._replace(load_position=log.position) if holds else source
 
 
@@ -285,9 +270,6 @@ def _recognised(path: Path) -> tuple[Rig, tuple[str, ...]]:
     """The one rig of config/rigs that can read a log, and a remark on that assumption.
 
     A rig whose columns are found by name is preferred to one whose columns are found by number.
-
-    Raises:
-        ValueError: No rig can read it, or several can.
     """
     folder = share_directory('seal_friction_ros', __file__) / 'config' / 'rigs'
     found: dict[str, Rig] = {}
@@ -323,53 +305,42 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
         holds_load = configuration.parameters().estimator.force_sum_correction.contains_load
         has_placeholder, chambers = configuration.has_placeholder, configuration.selection.seal_chambers
         document = None if has_placeholder else configuration.seal_documents[0]
-    order = in_order(stamp, received)
+    order = admission.in_order(stamp, received)
     columns[~(np.abs(columns) < 1e15)] = np.nan  # [SI] no measurement is as large
     columns = columns[:, order.rows]
     temperature = _from_the_first(columns[5] + ZEROS['degC']) if topics.temperature else None
     position = columns[4] if topics.position else None
-    dropped = {SAME_STAMP: order.same_stamp} if order.same_stamp else {}
-    log = _admitted(
-        RecordedLog(bag.name, Signals(order.seconds, *columns[:4]), Sliding(), temperature, position, dropped), options
-    )
-    places = position if holds_load else None
+    dropped = {admission.SAME_STAMP: order.same_stamp} if order.same_stamp else {}
+    signals, sliding = Signals(order.seconds, *columns[:4]), _sliding(Sliding(), options)
+    log, texts = _admitted(RecordedLog(bag.name, signals, sliding, temperature, position, dropped))
     return Source(
         _data_file(path),
         chambers,
-        log.log,
+        log,
         seal_document=document,
         has_placeholder=has_placeholder,
-        load_position=places,
-        remarks=(*(f'{bag.name}: {text}' for text in order.texts), *log.remarks),
+        load_position=position if holds_load else None,
+        remarks=(*(f'{bag.name}: {text}' for text in order.texts), *texts),
     )
 
 
-class _Admitted(NamedTuple):
-    log: RecordedLog
-    remarks: tuple[str, ...]
-
-
-def _admitted(log: RecordedLog, options: SourceOptions) -> _Admitted:
-    """The log with single missing values bridged, and remarks on it.
-
-    Raises:
-        ValueError: Too many samples are faulty.
-    """
-    columns, masks = zip(*(bridged(column) for column in log.signals[1:]), strict=True)
+def _admitted(log: RecordedLog) -> tuple[RecordedLog, tuple[str, ...]]:
+    """The log with single missing values bridged, and remarks on it."""
+    columns, masks = zip(*(admission.bridged(column) for column in log.signals[1:]), strict=True)
     count = int(np.logical_or.reduce(masks).sum())
     signals = Signals(log.signals.time, *columns)
     missing = int((~np.isfinite(np.array(columns)).all(axis=0)).sum())
-    check_admitted(log.name, len(signals.time) + sum(log.dropped.values()), {**log.dropped, NOT_FINITE: missing})
+    total, faulty = len(signals.time) + sum(log.dropped.values()), {**log.dropped, admission.NOT_FINITE: missing}
+    admission.check_admitted(log.name, total, faulty)
     texts = (f'{log.name}: {count} samples had no value, and are on a straight line between their neighbours',)
-    return _Admitted(log._replace(signals=signals, sliding=_sliding(log.sliding, options)), texts * (count > 0))
+    return log._replace(signals=signals), texts * (count > 0)
 
 
 def _from_the_first(temperature: FloatArray) -> FloatArray:
     """A temperature that holds before its first message, too: a sensor of 1 Hz comes after the first samples."""
-    finite = np.flatnonzero(np.isfinite(temperature))
-    if len(finite):
-        temperature[: finite[0]] = temperature[finite[0]]
-    return temperature
+    known = np.isfinite(temperature)
+    first = int(np.argmax(known))
+    return np.concatenate((np.full(first, temperature[first]), temperature[first:]))
 
 
 def _placeholder_remarks(each: Sequence[Source]) -> Iterator[str]:

@@ -28,7 +28,7 @@ from seal_friction_ros.core.identification.selection import (
     choose_anew,
     is_beaten,
     recommended,
-    rise_over_pressures,
+    rises_over_pressures,
     score_ladder,
     score_laws,
 )
@@ -377,11 +377,12 @@ HELD = Variation(speeds=False, asymmetry=False, exponent=False)
 @pytest.mark.parametrize('noise', [0.01, 0.1])
 @pytest.mark.parametrize(('truth', 'rises'), [(lambda p: 1.9 + 0.65 * p, True), (lambda p: 2.0 + 0.1 * p**1.5, True),
                                               (lambda p: 3.0 + 0.0 * p, False)])  # fmt: skip
-def test_a_law_rises_where_the_friction_rises_beyond_what_strokes_repeat_within(truth, rises, noise, pressures):
+def test_a_law_rises_where_the_friction_rises(truth, rises, noise, pressures):
     right = 0
     for seed in range(10):
         readings = repeated(truth, pressures, noise, seed)
-        found = recommended(score_ladder(candidate_laws(HELD), readings, HELD), rise_over_pressures(readings))
+        scores = score_ladder(candidate_laws(HELD), readings, HELD)
+        found = recommended(scores, rises=rises_over_pressures(readings))
         right += found.law.depends_on_pressure is rises
     assert right >= 9
 
@@ -389,7 +390,8 @@ def test_a_law_rises_where_the_friction_rises_beyond_what_strokes_repeat_within(
 def test_with_little_noise_the_exponent_is_that_of_the_friction():
     for exponent, name in ((1.0, '1'), (1.5, '3_2'), (2.0, '2')):
         readings = repeated(lambda p, m=exponent: 2.0 + 0.1 * p**m, (1, 3, 5, 7), 0.01, 0)
-        found = recommended(score_ladder(candidate_laws(HELD), readings, HELD), rise_over_pressures(readings))
+        scores = score_ladder(candidate_laws(HELD), readings, HELD)
+        found = recommended(scores, rises=rises_over_pressures(readings))
         assert found.law.name == f'pressure_power_law_{name}'
 
 
@@ -524,7 +526,7 @@ def test_a_fit_close_to_its_start_gives_the_same():
     readings = swept(values, law, scatter=2.0, n=600)
     found = fit(law, readings)
     near = {name: 1.05 * value for name, value in found.values.items()}
-    assert fit(law, readings, near, is_close=True).values == pytest.approx(found.values, rel=1e-4)
+    assert fit(law, readings, near).values == pytest.approx(found.values, rel=1e-4)
     assert fit(law, readings, {'something else': 3.0}).values == pytest.approx(found.values, rel=1e-6)
 
 
