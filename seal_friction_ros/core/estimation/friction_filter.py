@@ -18,10 +18,10 @@ n     remainder: what none of these explains and what passes within `REMAINDER_T
 ====  =============================================================================================
 
 The offset goes on with the way x of the rod, :math:`b_{i+1} = b_i + g\,\Delta x`; n and c are first-order Gauss-Markov
-processes, n over time and c over the relative change of f; the others are random walks and e is white. Friction is all but b, g and n, and its
-variance is that of the posterior: what cannot be told apart, as asymmetry from offset in one pressure, stays in the
-band, and so does a gradient beyond the longest stroke that the rod came back from. Terms that a motion does not excite
-keep their prior.
+processes, n over time and c over the relative change of f; the others are random walks and e is white. Friction is all
+but b, g and n, and its variance is that of the posterior: what cannot be told apart, as asymmetry from offset in one
+pressure, stays in the band, and so does a gradient beyond the longest stroke that the rod came back from. Terms that a
+motion does not excite keep their prior.
 
 The misfit keeps the scale the mean over all pressures: no law is right at each, and a law of one kind of seals for two
 misses some by a tenth. Without c the scale would be that of the pressure seen last.
