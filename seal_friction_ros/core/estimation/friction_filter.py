@@ -44,14 +44,12 @@ from seal_friction_ros.core.messages.records import NEVER
 
 # Prior: one standard deviation. A share is one of the friction by the law at the first sample.
 SCALE_PRIOR = 0.42  # [-] of another day, beside the deviation of the seal file
-VISCOUS_PRIOR = 1.0  # [s/m] share per speed
+VISCOUS_PRIOR = 2.0  # [s/m] share per speed
 ASYMMETRY_PRIOR = 0.08  # [-]
 OFFSET_PRIOR = 10.0  # [-] share
 GRADIENT_PRIOR = 30.0  # [1/m] share over the way
 # Random walks: one standard deviation after one second.
-SCALE_WALK = 0.005  # [-]
-VISCOUS_WALK = 0.02  # [s/m] share per speed
-ASYMMETRY_WALK = 0.001  # [-]
+WALK = 0.012  # [-] of scale, viscous friction and asymmetry, each a share of its prior
 OFFSET_WALK = 0.002  # [-] share
 # The gradient walks with the way: share over the longest stroke, after such a stroke.
 GRADIENT_WALK = 1.0  # [-]
@@ -257,19 +255,19 @@ def _predicted(
     """
     way, law, drift = reading.way, reading.friction, CURVED * reading.friction
     kept = REMAINDER_TIME / (REMAINDER_TIME + elapsed)
-    misfit, viscous, offset = MISFIT * law, VISCOUS_WALK * law, OFFSET_WALK * law
-    gradient, remainder = GRADIENT_WALK * law / longest, REMAINDER * law
+    misfit, viscous, offset = MISFIT * law, VISCOUS_PRIOR * law, OFFSET_WALK * law
+    walk, gradient, remainder = moved * WALK * WALK, GRADIENT_WALK * law / longest, REMAINDER * law
     curved = abs(way) / longest if known.unexplained.drift_square > drift * drift else 0.0
     (
         ss, sc, sk, sa, sb, sg, sn, cc, ck, ca, cb, cg, cn, kk, ka, kb, kg, kn,
         aa, ab, ag, an, bb, bg, bn, gg, gn, nn,
     ) = known.covariance  # fmt: skip
     return Covariance(
-        ss + moved * SCALE_WALK * SCALE_WALK, fits * sc, sk, sa, sb + way * sg, sg, kept * sn,
+        ss + walk * SCALE_PRIOR * SCALE_PRIOR, fits * sc, sk, sa, sb + way * sg, sg, kept * sn,
         fits * fits * cc + (1.0 - fits * fits) * misfit * misfit,
         fits * ck, fits * ca, fits * (cb + way * cg), fits * cg, kept * fits * cn,
-        kk + moved * viscous * viscous, ka, kb + way * kg, kg, kept * kn,
-        aa + moved * ASYMMETRY_WALK * ASYMMETRY_WALK, ab + way * ag, ag, kept * an,
+        kk + walk * viscous * viscous, ka, kb + way * kg, kg, kept * kn,
+        aa + walk * ASYMMETRY_PRIOR * ASYMMETRY_PRIOR, ab + way * ag, ag, kept * an,
         bb + way * (2.0 * bg + way * gg) + elapsed * offset * offset, bg + way * gg, kept * (bn + way * gn),
         gg + curved * gradient * gradient, kept * gn,
         kept * kept * nn + (1.0 - kept * kept) * remainder * remainder,

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from seal_friction_ros.core.estimation.friction_filter import (
     ASYMMETRY_PRIOR,
-    ASYMMETRY_WALK,
     CURVED,
     DRIFT_MEMORY,
     DRIFT_TIME,
@@ -32,13 +31,12 @@ from seal_friction_ros.core.estimation.friction_filter import (
     REMAINDER,
     REMAINDER_TIME,
     SCALE_PRIOR,
-    SCALE_WALK,
     SHORTEST_STROKE,
     STEP_OF_FRICTION,
     STEP_READINGS,
     USUAL_TIME,
     VISCOUS_PRIOR,
-    VISCOUS_WALK,
+    WALK,
     FrictionFilter,
     Reading,
     Terms,
@@ -139,7 +137,7 @@ class Textbook:
         self.law = law
         transition = np.diag([1.0, fits, 1.0, 1.0, 1.0, 1.0, kept])
         transition[4, 5] = way
-        walks = [SCALE_WALK, 0.0, VISCOUS_WALK * law, ASYMMETRY_WALK]
+        walks = [WALK * SCALE_PRIOR, 0.0, WALK * VISCOUS_PRIOR * law, WALK * ASYMMETRY_PRIOR]
         added = [*(moved * walk**2 for walk in walks), elapsed * (OFFSET_WALK * law) ** 2]
         added[1] = (1.0 - fits**2) * (MISFIT * law) ** 2
         is_curved = self.drift_square > (CURVED * law) ** 2
@@ -267,7 +265,7 @@ def drawn(seed: int, count: int) -> Iterator[tuple[Reading, np.ndarray]]:
     truth = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]) + std * rng.standard_normal(7)
     for number in range(count):
         if number:
-            walk = (SCALE_WALK, 0.0, VISCOUS_WALK * law, ASYMMETRY_WALK, OFFSET_WALK * law)
+            walk = (WALK * SCALE_PRIOR, 0.0, WALK * VISCOUS_PRIOR * law, WALK * ASYMMETRY_PRIOR, OFFSET_WALK * law)
             truth[:5] += math.sqrt(INTERVAL) * np.array(walk) * rng.standard_normal(5)
             truth[6] = kept * truth[6] + math.sqrt(1.0 - kept**2) * REMAINDER * law * float(rng.standard_normal())
         direction = 1 if number // 25 % 2 else -1
