@@ -115,7 +115,7 @@ def by_compare(bags, name, tmp_path, capsys):
 
 
 def by_live_view(bags, name, tmp_path, capsys):
-    now = RecordedView(bags / name).view('', -1.0)['now']
+    now = RecordedView(bags / name).load().view('', -1.0)['now']
     return now['verdict'], now['reason']
 
 
