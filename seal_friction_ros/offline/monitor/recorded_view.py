@@ -32,6 +32,7 @@ from seal_friction_ros.offline.monitor.actuator_view import (
     Known,
     Row,
     finite,
+    frame,
     next_interval,
     recent_bits,
     row,
@@ -149,6 +150,8 @@ class RecordedView:
         known = bag_topics(bag)
         types = {topic: info.type_name for topic, info in known.items() if info.message_count}
         answers = (ESTIMATE_TYPE, MACHINE_TYPE)
+        if not types:
+            raise BagError(f'{bag}: no message in it, so nothing to estimate from')
         if mapping is not None:
             types = {topic: kind for topic, kind in types.items() if topic in mapping.file.topics}
             types[MACHINE_CONFIGURATION] = CONFIGURATION_TYPE
@@ -248,18 +251,7 @@ class RecordedView:
             first = max(math.floor(since / self._period), last - _MOST_ROWS_AT_ONCE)
             every = {name: self._situation(track, last) for name, track in self._tracks.items()}
             rows = self._tracks[label].slice(first, max(last, 0))
-        return {
-            'label': label,
-            'time': round(end, 3),
-            'rows': rows,
-            'now': every[label],
-            'node': self._bag.resolve().name,
-            'actuators': [
-                {'label': name, 'verdict': one['verdict'], 'feedforward': one['feedforward']}
-                for name, one in every.items()
-            ],
-            'diagnostics': [],
-        }
+        return frame(label, end, rows, every, node=self._bag.resolve().name, diagnostics=[])
 
     def _situation(self, track: _Track, last: int) -> dict[str, Any]:
         """Words of the moment at a row or up to `_ROWS_A_MOMENT` rows before."""
