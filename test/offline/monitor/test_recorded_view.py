@@ -5,8 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from harness.browser import chromium
 from harness.closed_loop_bags import write_closed_loop
 from harness.example_bags import rewrite, write_inputs, write_recorded
+from harness.monitor_process import shown
 from paths import ROOT
 
 from seal_friction_ros.core.friction.states import FrictionState
@@ -15,6 +17,7 @@ from seal_friction_ros.offline.bags.bag import BagError, BagMessage, BagWriter, 
 from seal_friction_ros.offline.bags.recorded_run import read_run
 from seal_friction_ros.offline.monitor.actuator_view import COLUMNS, serious_words
 from seal_friction_ros.offline.monitor.recorded_view import RecordedView
+from seal_friction_ros.offline.monitor.server import MonitorServer
 
 
 @pytest.fixture(scope='module')
@@ -138,6 +141,23 @@ def test_a_bag_is_shown_from_its_first_estimate_on_while_the_rest_is_read(loop: 
     view.load()
     assert view.describe()['loaded'] == about['duration']
     assert view.view('', -1.0, 1.0) == whole
+
+
+@pytest.mark.skipif(not chromium(), reason='no Chromium: apt-get install chromium')
+def test_the_page_shows_how_far_a_bag_has_been_read_and_follows(loop: Path):
+    view, drawn = RecordedView(loop), 'byId("friction-curve").getBBox().width'
+    server = MonitorServer(view)
+    server.start()
+    try:
+        with shown(server.url, 1400) as page:
+            page.wait_for('byId("clock").textContent.includes("read to") && columns.time.length')
+            assert page.value('columns.time.at(-1)') <= view.describe()['loaded']
+            early = page.value(drawn)
+            view.load()
+            page.wait_for('!byId("clock").textContent.includes("read to")')
+            assert page.value(drawn) > 900.0 > early
+    finally:
+        server.stop()
 
 
 def test_damage_ends_what_is_shown_and_the_verdict_says_so(tmp_path: Path):
