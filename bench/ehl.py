@@ -5,13 +5,17 @@ Processor times of one core, on which a busy machine has little influence. The f
 
 import argparse
 import dataclasses
-import json
 import math
+import sys
 import timeit
 from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
 
 from one_core import processor_time
+
+sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+from harness.campaign import tell
 
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, init, step
 from seal_friction_ros.core.estimation.records import RodSample
@@ -106,11 +110,7 @@ def main() -> None:
     arguments = parser.parse_args()
     case, edge = (single_case(name, 'bench') for name in (arguments.case, arguments.edge))
     figures = times(case, arguments.cells, arguments.steps, arguments.calls, edge)
-    if arguments.json:
-        print(json.dumps(figures))
-        return
-    for name, value in figures.items():
-        print(f'{name:46} {value:8.3f}')
+    tell(figures, as_json=arguments.json, title='Lubricated contact')
 
 
 if __name__ == '__main__':

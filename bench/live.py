@@ -37,12 +37,11 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.task import Future
 from rich.console import Console
-from rich.markup import escape
 from rich.progress import Progress
-from rich.table import Table
 from seal_friction_msgs.msg import CylinderPressure, ForceSum, FrictionEstimate, FrictionFeedForward, RodVelocity
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+from harness.campaign import show
 from harness.compensation import LIVE
 from harness.processes import free_domain, graph_environment, node_process
 
@@ -356,19 +355,21 @@ def main() -> int:
 
 
 def _print(found: dict[str, dict[int, Figures]], compared: Mapping[str, str]) -> None:
-    console = Console()
-    names = list(next(iter(found[ALONE].values())).summary())
-    table = Table(*map(escape, ('node', 'rate [Hz]', *names)), title='Round trip')
-    for case, rates in found.items():
-        for rate, figures in rates.items():
-            table.add_row(case, str(rate), *(f'{value:g}' for value in figures.summary().values()))
-    console.print(table)
+    show(
+        [
+            {'node': case, 'rate [Hz]': rate, **figures.summary()}
+            for case, rates in found.items()
+            for rate, figures in rates.items()
+        ],
+        'Round trip',
+    )
     for other in dict.fromkeys(filter(None, compared.values())):
         rows = ratios(found, {case: its for case, its in compared.items() if its == other})
-        table = Table('node', *next(iter(rows.values())), title=f'Ratio to the {other}: median of rounds ± its error')
-        for name, values in rows.items():
-            table.add_row(name, *(f'{middle:g} ± {error:g}' for middle, error in values.values()))
-        console.print(table)
+        texts = {
+            node: {name: f'{middle:g} ± {error:g}' for name, (middle, error) in values.items()}
+            for node, values in rows.items()
+        }
+        show(texts, f'Ratio to the {other}: median of rounds ± its error')
 
 
 if __name__ == '__main__':

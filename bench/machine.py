@@ -28,8 +28,6 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.task import Future
-from rich.console import Console
-from rich.table import Table
 from seal_friction_msgs.msg import (
     CylinderPressure,
     ForceSum,
@@ -43,6 +41,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+from harness.campaign import tell
 from harness.compensation import LIVE, SCALE
 from harness.processes import free_domain, graph_environment, node_process
 
@@ -301,15 +300,8 @@ def main() -> int:
         }
         for one, rounds in found.items()
     }
-    if arguments.json:
-        print(json.dumps(figures))
-        return 0
-    table = Table(title=f'{arguments.rate} Hz, recorded, median of {arguments.rounds} rounds')
-    for heading in ('', *figures[OWN]):
-        table.add_column(heading, justify='left' if not heading else 'right')
-    for case, values in figures.items():
-        table.add_row(case, *(str(value) for value in values.values()))
-    Console().print(table)
+    title = f'{arguments.rate} Hz, recorded, median of {arguments.rounds} rounds'
+    tell(figures, as_json=arguments.json, title=title)
     return 0
 
 

@@ -11,7 +11,6 @@ Without, simulator, monitor, page and estimator share all of them: on two, the p
 """
 
 import argparse
-import json
 import os
 import subprocess
 import sys
@@ -25,11 +24,10 @@ from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
-from rich.console import Console
-from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
 from harness.browser import browser, chromium
+from harness.campaign import tell
 from harness.compensation import LIVE
 from harness.monitor_process import Reader, monitor
 from harness.moving_machine import machine
@@ -209,15 +207,8 @@ def main() -> int:
             'monitor itself [%]': round(100 * median(one.monitor_cpu for one in found.monitor), 1),
             'load of the machine': round(os.getloadavg()[0], 1),
         }
-    if arguments.json:
-        print(json.dumps(figures))
-        return 0
-    table = Table(title=f'1 kHz, median of {arguments.rounds} rounds of {arguments.seconds:g} s')
-    for heading in ('', *next(iter(figures.values()))):
-        table.add_column(heading, justify='left' if not heading else 'right')
-    for case, values in figures.items():
-        table.add_row(case, *(str(value) for value in values.values()))
-    Console().print(table)
+    title = f'1 kHz, median of {arguments.rounds} rounds of {arguments.seconds:g} s'
+    tell(figures, as_json=arguments.json, title=title)
     return 0
 
 

@@ -23,9 +23,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
+
+sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+from harness.campaign import show
 
 SMALLEST = 10_000  # [samples]
 RATE = 1000  # [Hz]
@@ -229,22 +229,14 @@ def measure(largest: int, names: list[str], folder: Path, copies: int) -> dict[s
     return {'sizes': sizes, 'tasks': found, 'workers [s]': workers}
 
 
-def show(figures: dict[str, Any]) -> None:
+def print_figures(figures: dict[str, Any]) -> None:
     """Print the table."""
-    table = Table(title=Text('Processor time [s] against samples; a sample is three messages'))
-    for heading in (
-        '',
-        *(f'{samples:.0e}' for samples in figures['sizes']),
-        'exponent',
-        'to make ready [s]',
-        'most of a process [MB]',
-    ):
-        table.add_column(Text(heading), justify='right' if heading else 'left')
+    rows = {}
     for task, row in figures['tasks'].items():
-        times = [row['time [s]'].get(samples) for samples in figures['sizes']]
-        cells = [f'{value:.3g}' if value is not None else '-' for value in times]
-        table.add_row(task, *cells, f'{row["exponent"]:.2f}', f'{row["ready [s]"]:.2f}', f'{row["memory [MB]"]:.0f}')
-    Console().print(table)
+        rows[task] = {f'{samples:.0e}': _text(row['time [s]'].get(samples)) for samples in figures['sizes']}
+        rows[task] |= {'exponent': f'{row["exponent"]:.2f}', 'ready [s]': f'{row["ready [s]"]:.2f}'}
+        rows[task]['memory [MB]'] = f'{row["memory [MB]"]:.0f}'
+    show(rows, 'Processor time [s] against samples; a sample is three messages; memory: most of a process')
     if not all(map(find_spec, OTHER_READERS.values())):
         print('rosbags or mcap-ros2-support is not installed, so its row is empty: make test installs both')
     if figures['workers [s]']:
@@ -253,6 +245,10 @@ def show(figures: dict[str, Any]) -> None:
             f'The largest bag {copies} times: {one:.1f} s by one process, '
             f'{two:.1f} s by two on the wall, so {ratio:.2f} times as fast'
         )
+
+
+def _text(time: float | None) -> str:
+    return '-' if time is None else f'{time:.3g}'
 
 
 def main() -> int:
@@ -274,7 +270,7 @@ def main() -> int:
     if arguments.json:
         print(json.dumps(figures))
     else:
-        show(figures)
+        print_figures(figures)
     return 0
 
 

@@ -5,13 +5,13 @@ The thesis's ring, calibrated, at its five pressures. Processor times of one cor
 
 import argparse
 import dataclasses
-import json
 import sys
+from pathlib import Path
 
 from one_core import processor_time
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
+
+sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+from harness.campaign import tell
 
 from seal_friction_ros.core.oring_contact.loading import oring_model
 from seal_friction_ros.core.oring_contact.oring_case import OringNumerics
@@ -44,15 +44,7 @@ def main() -> int:
     arguments = parser.parse_args()
     measure(9)  # the first run loads libraries and is not counted
     rows = [measure(lines) for lines in arguments.lines]
-    if arguments.json:
-        print(json.dumps(rows))
-        return 0
-    table = Table()
-    for heading in rows[0]:
-        table.add_column(Text(heading), justify='right')
-    for row in rows:
-        table.add_row(*(f'{value:.4g}' if isinstance(value, float) else str(value) for value in row.values()))
-    Console().print(table)
+    tell(rows, as_json=arguments.json, title='Meshes')
     return 0
 
 

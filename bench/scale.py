@@ -22,10 +22,9 @@ from pathlib import Path
 from typing import Any
 
 from offline import RATE, RIG, write_log
-from rich.console import Console
-from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+from harness.campaign import show
 from harness.dask_cluster import dask_cluster
 
 HOUR = 3600.0  # [s]
@@ -200,16 +199,10 @@ def measure(seconds: float, counts: list[int], bag_seconds: float, folder: Path)
     return {'an hour': hour, f'a year of {MACHINES} cylinders': year, 'bags': of_bags(small, folder / 'bags', counts)}
 
 
-def show(figures: dict[str, Any]) -> None:
+def print_figures(figures: dict[str, Any]) -> None:
     """Print the tables."""
     hour = figures['an hour']
-    table = Table(title='An hour of one cylinder at 1 kHz')
-    for heading in ('', 'processor time [s]', 'ready, once [s]', 'memory [MB]'):
-        table.add_column(heading, justify='right' if heading else 'left')
-    for name, row in hour['steps'].items():
-        table.add_row(name, *(f'{value:.3g}' for value in row.values()))
-    console = Console()
-    console.print(table)
+    show(hour['steps'], 'An hour of one cylinder at 1 kHz, processor time')
     print(', '.join(f'{name}: {size:.0f} MB/h' for name, size in hour['bytes [MB/h]'].items()))
     year = f'a year of {MACHINES} cylinders'
     print(f'{year}: ' + ', '.join(f'{name} {value:.3g}' for name, value in figures[year].items()))
@@ -235,7 +228,7 @@ def main() -> int:
     if arguments.json:
         print(json.dumps(figures))
     else:
-        show(figures)
+        print_figures(figures)
     return 0
 
 

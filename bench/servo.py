@@ -7,7 +7,12 @@
 
 import argparse
 import json
+import sys
 import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+from harness.campaign import show
 
 from seal_friction_ros.core.servo.motions import Sine
 from seal_friction_ros.core.servo.position_servo import ServoParameters, init, simulate, step
@@ -50,10 +55,10 @@ def main() -> None:
     if arguments.json:
         print(json.dumps({'control_period': PERIOD, 'rows': rows}))
         return
-    print(f'sample {PERIOD * 1e3:g} ms; times real time')
-    print(f'{"inner step":>12} {"step":>9} {"simulate":>9}')
-    for row in rows:
-        print(f'{row["inner_step"] * 1e6:>9.0f} us {row["step"]:>9.1f} {row["simulate"]:>9.1f}')
+    show(
+        [{'inner step [us]': f'{1e6 * row.pop("inner_step"):.0f}', **row} for row in rows],
+        f'Sample {PERIOD * 1e3:g} ms; times real time',
+    )
 
 
 if __name__ == '__main__':

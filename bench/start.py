@@ -7,7 +7,6 @@ the memory of both.
 """
 
 import argparse
-import json
 import os
 import subprocess
 import sys
@@ -20,11 +19,9 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from live import ALONE, Asker
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+from harness.campaign import tell
 from harness.compensation import LIVE
 from harness.processes import free_domain, node_process
 
@@ -97,13 +94,7 @@ def main() -> int:
                 times[name].append(duration)
     found = {f'{name} [s]': round(median(durations), 3) for name, durations in times.items()}
     found['estimator, memory [MB]'] = round(first_estimate().memory)
-    if arguments.json:
-        print(json.dumps(found))
-        return 0
-    table = Table('what', 'figure', title='Start, medians of times')
-    for name, figure in found.items():
-        table.add_row(Text(name), f'{figure:g}')
-    Console().print(table)
+    tell(found, as_json=arguments.json, title='Start, medians of times')
     return 0
 
 

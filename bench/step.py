@@ -23,12 +23,10 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 from seal_friction_msgs.msg import RodVelocity
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+from harness.campaign import show
 from harness.compensation import compensating
 from harness.processes import free_domain
 
@@ -163,13 +161,13 @@ def main() -> int:
     if arguments.json:
         print(json.dumps({f'{name} [us]': duration for name, duration in figures.items()}))
         return 0
-    table = Table(title=f'One sample, median of {arguments.batches} batches of {CALLS}')
-    for heading in ('stage', 'time [us]', 'bare calls'):
-        table.add_column(Text(heading), justify='left' if heading == 'stage' else 'right')
-    for name, duration in figures.items():
-        table.add_row(name + ' *' * (name in LIVE), f'{duration:.2f}', f'{duration / figures["bare call"]:.0f}')
-    table.add_row('* one sample', f'{sum(figures[name] for name in LIVE):.2f}', '')
-    Console().print(table)
+    bare = figures['bare call']
+    rows = {
+        name + ' *' * (name in LIVE): {'time [us]': f'{duration:.2f}', 'bare calls': f'{duration / bare:.0f}'}
+        for name, duration in figures.items()
+    }
+    rows['* one sample'] = {'time [us]': f'{sum(figures[name] for name in LIVE):.2f}'}
+    show(rows, f'One sample, median of {arguments.batches} batches of {CALLS}')
     return 0
 
 

@@ -129,6 +129,17 @@ def test_every_quick_command_of_the_readme_runs(checkout: Path):
     check_commands(quick, checkout)
 
 
+def test_the_python_of_the_readme_runs(checkout: Path):
+    (code,) = re.findall(r'```python\n(.*?)```', README, re.DOTALL)
+    result = run(f'.venv/bin/python - <<"EOF"\n{code}EOF', checkout)
+    friction, largest = map(float, result.stdout.split())
+    assert 0.0 < friction < largest
+
+
+def test_the_readme_is_short():
+    assert len(README.split()) <= 900
+
+
 @pytest.mark.long  # every one of these commands has tests of its own
 def test_every_slow_command_of_the_readme_runs(workspace: Path):
     (workspace / 'build').mkdir()
@@ -174,8 +185,8 @@ def test_the_servo_on_the_desk_runs_as_the_readme_says_and_gets_its_feed_forward
 
 
 def test_the_commands_of_the_live_view_print_an_address_that_answers(checkout: Path):
-    lines = commands(' monitor', (ROOT / 'docs' / 'monitor.md').read_text())
-    assert len(lines) == 3
+    lines = [*commands(' monitor'), *commands(' monitor', (ROOT / 'docs' / 'monitor.md').read_text())]
+    assert len(lines) == 4
     for command in lines:
         words = command.replace('.venv/bin', str(ROOT / '.venv' / 'bin')).split()
         environment = graph_environment(free_domain())
@@ -275,10 +286,11 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r'[^\w\- ]', '', heading.lower()).replace(' ', '-') for heading in headings}
 
 
-def test_every_figure_is_made_by_a_command():
+def test_every_figure_is_made_by_a_command_and_shown():
     source = (ROOT / 'tools' / 'make_figures.py').read_text()
-    docs = '\n'.join(page.read_text() for page in (ROOT / 'docs').glob('*.md'))
+    docs = '\n'.join(page.read_text() for page in PAGES)
     for figure in (ROOT / 'docs' / 'figures').iterdir():
+        assert f'figures/{figure.name})' in docs
         assert f"'{figure.name}'" in source or f'--figure docs/figures/{figure.name}' in docs
 
 

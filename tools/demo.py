@@ -98,7 +98,8 @@ def friction_table(runs: list[Run]) -> Table:
     """Measured and estimated Coulomb friction at every pressure of every run."""
     table = Table(title='Coulomb friction, measured and estimated live')
     for heading in ('run', 'pressure [bar]', 'measured [N]', 'estimated [N]', 'std [N]', 'deviation [%]'):
-        table.add_column(Text(heading), justify='left' if heading == 'run' else 'right')
+        is_name = heading == 'run'
+        table.add_column(Text(heading), justify='left' if is_name else 'right', no_wrap=is_name)
     for run in runs:
         for level in run.report.numbers['friction']['sliding']:
             deviation = 'none' if level['deviation_percent'] is None else f'{level["deviation_percent"]:+.1f}'
@@ -110,14 +111,13 @@ def friction_table(runs: list[Run]) -> Table:
 def run_table(runs: list[Run]) -> Table:
     """How long an estimate took, and whether the replay gave the same bytes."""
     table = Table(title='Live runs: velocity sample out, estimate back')
-    for heading in ('run', 'samples', 'p50 [us]', 'p99 [us]', 'replay', 'bag', 'report'):
-        table.add_column(Text(heading), justify='right' if heading.startswith(('p', 's')) else 'left', overflow='fold')
+    for heading in ('run', 'samples', 'p50 [us]', 'p99 [us]', 'replay'):
+        table.add_column(Text(heading), justify='right' if heading.startswith(('p', 's')) else 'left')
     for run in runs:
         f = run.figures
         verdict = 'identical' if run.identical else 'DIFFERENT'
         figures = (f.get(name, '') for name in ('velocity samples', 'round trip p50 [us]', 'round trip p99 [us]'))
-        paths = (str(path.relative_to(ROOT)) for path in (run.bag, run.report.page))
-        table.add_row(run.bag.name, *figures, verdict, *paths)
+        table.add_row(run.bag.name, *figures, verdict)
     return table
 
 
@@ -176,7 +176,7 @@ def machine_table(bags: dict[str, Path]) -> tuple[Table, bool]:
 def main() -> int:
     """Run it all; 0 if every replay gave the recorded bytes."""
     started, load = time.monotonic(), os.getloadavg()[0]
-    console = Console(width=None if sys.stdout.isatty() else 120)
+    console = Console()
     shutil.rmtree(OUT, ignore_errors=True)
     recorded = [*play_all(console)]
     with ProcessPoolExecutor(2, get_context('spawn'), os.nice, (19,)) as pool:  # beside the loop, and out of its way
@@ -204,6 +204,7 @@ def main() -> int:
     console.print(friction_table(played), run_table([*played, loop]), tracking_table(loop), machine)
     if busy := busy_text(load, len(os.sched_getaffinity(0)), loop.figures):
         console.print(busy, style='bold yellow')
+    console.print(f'each run is a bag, with its report: {OUT.relative_to(ROOT)}/RUN and RUN.html')
     console.print(f'the servo with and without friction: {SERVO_PAGE.relative_to(ROOT)}')
     console.print(f'{time.monotonic() - started:.0f} s in all')
     return 0 if machine_identical and all(run.identical for run in (*played, loop)) else 1

@@ -119,7 +119,6 @@ def main() -> int:
                 raise SystemExit(f'seal_friction ehl {command} {case} failed')
         for source, target in {
             'report_figures/live_estimate.png': 'live_estimate.png',
-            'report_figures/friction_over_pressure.png': 'friction_over_pressure.png',
             'seal_figures/fig23_states_2_and_3.png': 'friction_states.png',
             'oring_figures/contact_stress_profiles.png': 'oring_contact_stress.png',
             'oring_figures/deformed_shape.png': 'oring_shape.png',

@@ -11,7 +11,7 @@ from harness.monitor_process import monitor
 from harness.processes import free_domain, node_process
 from paths import ROOT
 
-SIZE = (1400, 1010)  # [px]
+SIZE = (1400, 765)  # [px] the first four plots
 PATIENCE = 120.0  # [s] until the simulator runs: it may compile first
 SEALS = {'seals': ['ms28775_114@a', 'ms28775_114@b']}
 UNDISTURBED = 'columns.status.slice(-500).every((bits) => (bits & ~0xa0000) === 0) && now.verdict === "good"'

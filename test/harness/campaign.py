@@ -1,4 +1,4 @@
-"""What the campaigns of ``test/system`` share: their arguments, and how they say what they found."""
+"""What the campaigns of ``test/system`` share: their arguments, and how they, and the benches, say what they found."""
 
 import argparse
 import json
@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+_ANY = 10_000  # columns, more than any table has
 Rows = Sequence[Mapping[str, Any]] | Mapping[str, Any]
 """Rows, rows by name, or figures by name"""
 
@@ -27,15 +28,30 @@ def tell(found: Rows, *, as_json: bool, title: str = '') -> None:
     """Print one table, or JSON."""
     if as_json:
         print(json.dumps(found))
-        return
+    else:
+        show(found, title)
+
+
+def show(found: Rows, title: str = '') -> None:
+    """Print a table; where the terminal (a pipe: 80 columns) is too narrow for it, a list of figures for each row."""
     rows = found if not isinstance(found, Mapping) else [{'': name, **_row(row)} for name, row in found.items()]
-    headings = dict.fromkeys(heading for row in rows for heading in row)
-    table = Table(title=title)
-    for heading in headings:
-        table.add_column(Text(heading))
+    headings = list(dict.fromkeys(heading for row in rows for heading in row))
+    table, console = Table(title=Text(title)), Console()
+    for place, heading in enumerate(headings):
+        table.add_column(Text(heading), justify='right' if place else 'left')
     for row in rows:
         table.add_row(*(Text(_text(row.get(heading, ''))) for heading in headings))
-    Console(width=160).print(table)
+    if console.measure(table, options=console.options.update(width=_ANY)).maximum <= console.width:
+        console.print(table)
+        return
+    console.print(Text(title, 'italic'))
+    for row in rows:
+        (_, name), *figures = row.items()
+        console.print(Text(_text(name), 'bold'))
+        block = Table.grid(padding=(0, 2))
+        for heading, value in figures:
+            block.add_row('', Text(heading), Text(_text(value)))
+        console.print(block)
 
 
 def tell_tables(tables: Mapping[str, Rows], *, as_json: bool) -> None:

@@ -95,10 +95,14 @@ def test_a_slider_sets_the_parameter_and_shows_the_answer_of_the_node(changing: 
             page.value(f'byId("field-scale").value = "{value}"')
             page.value('byId("field-scale").dispatchEvent(new Event("change"))')
             page.wait_for(f'byId("change-answer").className === "{word}"')
+            page.value('window.confirm = (text) => { window.asked = text; return text.startsWith("Scale 7"); }')
         said = page.value('byId("change-answer").textContent')
         assert said.startswith('REJECTED by /friction_estimator')
         for name in ('field', 'slide'):  # what the node refused jumps back
             assert float(page.value(f'byId("{name}-scale").value')) == 0.4
+        page.value('byId("field-scale").value = "1.2"; byId("field-scale").dispatchEvent(new Event("change"))')
+        assert page.value('window.asked').startswith('Scale 1.2')  # and was told no
+        assert float(page.value('byId("field-scale").value')) == 0.4
         assert changing.wait_for(lambda view: view['now']['settings']['scale'] == 0.4)
 
 
@@ -133,7 +137,7 @@ def test_a_machine_of_three_shows_each_actuator_and_off_takes_out_all_forces(tmp
         assert all(f'{name}.feedforward.scale = 0' in answer for name in NAMES)
         assert running.wait_for(lambda view: all(one['feedforward'] == 0.0 for one in view['actuators']))
         check_page(page, running.port)
-    recorded = RecordedView(tmp_path / 'bag')
+    recorded = RecordedView(tmp_path / 'bag').load()
     frame = recorded.view('', -1.0)
     assert [one['label'] for one in frame['actuators']] == [f'{name} (/machine_estimator)' for name in NAMES]
     assert all(one['feedforward'] == 0.0 for one in frame['actuators'])
@@ -250,8 +254,17 @@ def test_a_bag_is_shown_at_any_moment_and_plays(width: int):
             page.wait_for('byId("faults").textContent !== "none" || columns.status.some((bits) => bits)')
             page.value('byId("time").value = 1; byId("time").dispatchEvent(new Event("input"))')
             page.wait_for('Math.abs(columns.time.at(-1) - 1) < 0.02')
+            page.value('byId("speed").value = 10')
             page.click('#play')
-            page.wait_for('columns.time.at(-1) > 1.5')
+            page.wait_for('columns.time.at(-1) > 3.5')
+            page.click('#play')
+            page.wait_for('about.loaded === about.duration')
+            page.value('byId("time").value = 1; byId("time").dispatchEvent(new Event("input"))')
+            for begin in page.value('about.faults[label].map(([begin]) => begin)')[:2]:
+                page.click('#next-fault')
+                page.wait_for(f'Math.abs(columns.time.at(-1) - {begin} - 2.5) < 0.06')
+            drawn = {name: page.value(f'byId("{name}").getBBox().width') for name in ('friction-curve', 'reversals')}
+            assert drawn['friction-curve'] > 900.0 > drawn['reversals'] > 0.0
             assert page.value('byId("off").hidden')
             check_page(page, urlsplit(url).port)
     finally:

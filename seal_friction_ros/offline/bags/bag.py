@@ -420,6 +420,12 @@ def bag_topics(path: Path) -> dict[str, TopicInfo]:
     return found
 
 
+def bag_end(path: Path) -> int:
+    """Last log time of a bag by its index [ns]; errors as of `bag_channels`."""
+    with _as_bag_errors(path):
+        return max(storage(path).read('file_ends'), default=0)
+
+
 def read_definitions(path: Path, types: Iterable[str]) -> dict[str, Definition]:
     """Definition of each of some types (``package/Name``), of the bag if it has one.
 

@@ -52,6 +52,12 @@ def file_messages(path: Path) -> Iterator[BagMessage]:
             yield BagMessage(*names[number], log_time, data)
 
 
+def file_ends(path: Path) -> list[int]:
+    """Last log time [ns]."""
+    with _opened(path) as database:
+        return [int(time or 0) for (time,) in database.execute('SELECT max(timestamp) FROM messages')]
+
+
 @contextmanager
 def _opened(path: Path) -> Iterator[sqlite3.Connection]:
     with closing(sqlite3.connect(f'{path.resolve().as_uri()}?mode=ro&immutable=1', uri=True)) as database:

@@ -3,6 +3,7 @@
 import argparse
 import os
 import sys
+import threading
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -54,7 +55,9 @@ def _show_bag(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.monitor.token_file import kept_token
 
     token = kept_token(arguments.token_file) if arguments.token_file else ''
-    server = MonitorServer(RecordedView(arguments.bag, cli.mapping_of(arguments)), arguments.port, token)
+    view = RecordedView(arguments.bag, cli.mapping_of(arguments))
+    server = MonitorServer(view, arguments.port, token)
+    threading.Thread(target=view.load, daemon=True).start()
     print(server.told(as_json=arguments.json), flush=True)
     server.serve()
     return cli.SUCCESS

@@ -246,6 +246,14 @@ def sample_of(known: Known, held: Held) -> tuple[float, ...]:
     return (one.stamp * 1e-9, speed, seen, math.nan if force is None else force, *answers, *ends)
 
 
+def tracked_of(held: Held) -> tuple[float, ...]:
+    """Newest estimate and motion as a row of a `TrackingFollower`; NaN for a missing input."""
+    one, records = held.estimate, held.records
+    kinds = ((Velocity, 'velocity'), (Position, 'position'), (ServoReference, 'position'), (FeedForward, 'force'))
+    *motion, force = (getattr(records.get(kind), name, math.nan) for kind, name in kinds)
+    return (one.stamp * 1e-9, *motion, one.state, force)
+
+
 def measured_friction(known: Known, held: Held) -> tuple[type, float | None]:
     """Friction [N] that the measurements show: the force sum, which is the friction while the speed is even.
 
@@ -342,7 +350,7 @@ def situation(
     cause, why = _cause(held, now, said, presence)
     present = [Finding(BAD, why, 'bring it back')] if cause else list(_present(held, bits.status, now, said))
     seals = [PLACEHOLDER] if known.has_placeholder else []
-    decides = deciding([*present, *seals, *findings, _ESTIMATING])
+    decides = deciding([*present, *findings, *seals, _ESTIMATING])
     frame = getattr(held.records.get(Velocity), 'frame_id', b'')
     return {
         'verdict': decides.level,
@@ -378,6 +386,14 @@ def situation(
             'force_limit': finite(known.force_limit),
         },
     }
+
+
+def frame(
+    label: str, time: float, rows: Sequence[Row], every: Mapping[str, dict[str, Any]], **more: Any
+) -> dict[str, Any]:
+    """What a page gets at a time [s]: rows of the actuator ``label``, and of ``every`` actuator what its tab shows."""
+    tabs = [{'label': name} | {key: one[key] for key in ('verdict', 'feedforward')} for name, one in every.items()]
+    return {'label': label, 'time': round(time, 3), 'rows': rows, 'now': every[label], 'actuators': tabs, **more}
 
 
 def _faults(status: int) -> list[str]:

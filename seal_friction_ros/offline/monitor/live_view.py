@@ -6,7 +6,15 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from seal_friction_ros.core.estimation.findings import BAD, Finding
-from seal_friction_ros.offline.monitor.actuator_view import COLUMNS, Row, next_interval, recent_bits, row, situation
+from seal_friction_ros.offline.monitor.actuator_view import (
+    COLUMNS,
+    Row,
+    frame,
+    next_interval,
+    recent_bits,
+    row,
+    situation,
+)
 from seal_friction_ros.offline.monitor.node_view import NodeView
 from seal_friction_ros.offline.monitor.off_latch import Answer, OffLatch, Scale
 
@@ -112,20 +120,8 @@ class LiveView:
             every = {name: self._situation(view, key) for name, (view, key) in found.items()}
             rows = newer(self._rows.get((shown.node, actuator), ()), since)
             diagnostics = [{'part': part, **status} for part, status in shown.diagnostics.items()]
-        return {
-            'label': label,
-            'time': round((self._now - self._start) * 1e-9, 3),
-            'rows': rows,
-            'now': every[label],
-            'node': shown.node,
-            'nodes': unread,
-            'off': off,
-            'actuators': [
-                {'label': name, 'verdict': one['verdict'], 'feedforward': one['feedforward']}
-                for name, one in every.items()
-            ],
-            'diagnostics': diagnostics,
-        }
+        time, more = (self._now - self._start) * 1e-9, {'nodes': unread, 'off': off, 'diagnostics': diagnostics}
+        return frame(label, time, rows, every, node=shown.node, **more)
 
     def _situation(self, view: NodeView, actuator: str) -> dict[str, Any]:
         rows, time = self._rows.get((view.node, actuator), ()), (self._now - self._start) * 1e-9

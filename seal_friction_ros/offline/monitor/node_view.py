@@ -26,9 +26,13 @@ from seal_friction_ros.offline.monitor.actuator_view import (
     known_of,
     sample_of,
     take,
+    tracked_of,
 )
 from seal_friction_ros.offline.monitor.off_latch import Scale
+from seal_friction_ros.offline.replay.run_findings import raised
+from seal_friction_ros.offline.replay.tracking_evaluation import TrackingFollower
 
+_TRACKED = 600.0  # [s] so long the tracking counts live; our choice: 60 000 samples are evaluated within some 10 ms
 DefinitionsOf = Callable[[Iterable[str]], Mapping[str, Definition]]
 """Definition of each message type."""
 
@@ -62,6 +66,7 @@ class NodeView:
         self._translation: Translation | None = None
         self._remembered = remembered
         self._followers: dict[str, Follower] = {}
+        self._tracking: dict[str, TrackingFollower] = {}
         self._found: dict[str, tuple[int, list[Finding]]] = {}
 
     @property
@@ -105,6 +110,9 @@ class NodeView:
         else:
             self._machine = self._translation = None
         self.held = {name: self.held.get(name, NOTHING_HELD) for name in self.known}
+        kept = _TRACKED if math.isfinite(self._remembered) else math.inf
+        for name, one in snapshot.actuators.items():
+            self._tracking.setdefault(name, TrackingFollower(kept)).configure(one.snapshot)
         self.refused = ''
 
     def hear(self, received: int) -> None:
@@ -164,6 +172,8 @@ class NodeView:
             if isinstance(record, FrictionEstimate) and record.stamp != NEVER:
                 follower = self._followers.setdefault(actuator, Follower(self._remembered))
                 follower.add(sample_of(self.known[actuator], self.held[actuator]))
+                if actuator in self._tracking:
+                    self._tracking[actuator].add(tracked_of(self.held[actuator]))
 
     def findings(self, actuator: str, until: int | None = None) -> list[Finding]:
         """Findings on the run of an actuator up to a stamp [ns], or to the second in which the stream is."""
@@ -173,6 +183,9 @@ class NodeView:
         key = self.held[actuator].estimate.stamp // 1_000_000_000 if until is None else until
         if self._found.get(actuator, (None,))[0] != key:
             seen = follower.seen(math.inf if until is None else until * 1e-9)
-            found = findings_of(seen, uses_scale=self.known[actuator].adaptation == 'on')
+            known = self.known[actuator]
+            found = findings_of(seen, has_placeholder=known.has_placeholder, uses_scale=known.adaptation == 'on')
+            if until is None and actuator in self._tracking:
+                found = [*raised(self._tracking[actuator].evaluation()), *found]
             self._found[actuator] = key, found
         return self._found[actuator][1]

@@ -1,19 +1,24 @@
-"""The view of a bag: the same rows and words as live, at any moment of the recording."""
+"""The view of a bag: the same rows and words as live, at any moment of the recording that has been read."""
 
 import math
+import threading
+import time
 from array import array
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from seal_friction_ros.core.estimation.findings import Finding
+import numpy as np
+
+from seal_friction_ros.core.estimation.findings import BAD, STATUS_WORDS, USUAL, Finding
+from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.messages.coder import DECODERS
 from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, ESTIMATE_TYPE, MACHINE_TYPE
 from seal_friction_ros.offline.bags.actuator_bag import RECORDED
 from seal_friction_ros.offline.bags.bag import (
     BagError,
     BagMessage,
-    TopicInfo,
+    bag_end,
     bag_topics,
     read_definitions,
     read_messages,
@@ -26,6 +31,8 @@ from seal_friction_ros.offline.monitor.actuator_view import (
     Held,
     Known,
     Row,
+    finite,
+    frame,
     next_interval,
     recent_bits,
     row,
@@ -35,13 +42,15 @@ from seal_friction_ros.offline.monitor.actuator_view import (
 from seal_friction_ros.offline.monitor.live_view import CHANGEABLE, RATE
 from seal_friction_ros.offline.monitor.node_view import NodeView
 from seal_friction_ros.offline.monitor.off_latch import Answer
-from seal_friction_ros.offline.work.progress import progress
 
 MOST_ROWS = 120_000  # of an actuator, 20 minutes at full pace; a longer bag has rows further apart (our choice)
 _ROWS_A_MOMENT = 10  # rows from one moment whose words are kept to the next
 _MOST_ROWS_AT_ONCE = 12_000  # in one answer to the page
 _MOST_MARKS = 200  # on the slider
+_PARTS = 800  # of the overview
+_SLICE, _PAUSE = 0.02, 0.001  # [s] reading, and the page may ask (our choice)
 _CONFIGURATION = '/configuration'
+_SERIOUS = sum(map(int, STATUS_WORDS)) & ~int(USUAL)
 
 
 class _Track:
@@ -58,12 +67,16 @@ class _Track:
         self._start = start
         self.rows = array('d')  # flat, NaN for None
         self.moments: list[tuple[Known, Held]] = []
+        self.first = math.inf  # [s] of the first estimate
 
     def add(self, known: Known, held: Held, time: float, since: int) -> None:
         """Add a row, and after some of them a moment; arguments as of `row`."""
         if len(self.rows) // len(COLUMNS) % _ROWS_A_MOMENT == 0:
             self.moments.append((known, held))
-        self.rows.extend(math.nan if value is None else value for value in row(known, held, time, since))
+        numbers = row(known, held, time, since)
+        if self.first == math.inf and numbers[COLUMNS.index('estimate')] is not None:
+            self.first = time
+        self.rows.extend(math.nan if value is None else value for value in numbers)
 
     def slice(self, first: int, last: int) -> list[Row]:
         """Rows ``first`` to ``last``."""
@@ -71,12 +84,21 @@ class _Track:
         flat = self.rows[max(first - self._start, 0) * width : max(last + 1 - self._start, 0) * width]
         return [_as_row(flat[i : i + width]) for i in range(0, len(flat), width)]
 
-    @property
-    def first(self) -> float:
-        """Time of the first estimate [s]; infinite without one."""
-        width, estimate = len(COLUMNS), COLUMNS.index('estimate')
-        places = (i for i in range(0, len(self.rows), width) if not math.isnan(self.rows[i + estimate]))
-        return next((self.rows[i] for i in places), math.inf)
+    def _columns(self, *names: str) -> list[FloatArray]:
+        rows = np.array(self.rows).reshape(-1, len(COLUMNS))
+        return [rows[:, COLUMNS.index(name)] for name in names]
+
+    def overview(self) -> dict[str, Any]:
+        """Time [s], lowest and highest friction [N] of each part of the bag; times of the reversals [s]."""
+        time, friction, low = self._columns('time', 'estimate', 'low')
+        starts = np.unique(np.linspace(0, len(time), min(_PARTS, len(time)), endpoint=False).astype(int))
+        curve = zip(time[starts], np.fmin.reduceat(friction, starts), np.fmax.reduceat(friction, starts), strict=True)
+        slides = np.flatnonzero(np.isfinite(low))  # there is a band while the rod slides
+        turns = slides[1:][np.diff(np.sign(friction[slides])) != 0]
+        return {
+            'curve': [[finite(float(value)) for value in point] for point in curve],
+            'reversals': [time[place] for place in turns[:: len(turns) // _PARTS + 1]],
+        }
 
     def faults(self, gap: float) -> list[tuple[float, float, str]]:
         """Begin and end [s] of each stretch with a fault or without estimates, and its words.
@@ -84,19 +106,17 @@ class _Track:
         Args:
             gap: Longest time from one fault to the next in a stretch [s].
         """
-        found: list[tuple[float, float, dict[str, None]]] = []
-        width, estimate, status = len(COLUMNS), COLUMNS.index('estimate'), COLUMNS.index('status')
-        newest = math.nan
-        for i in range(0, len(self.rows), width):
-            time = self.rows[i]
-            newest = newest if math.isnan(self.rows[i + estimate]) else time
-            words = ['no estimate'] if time - newest > TOO_OLD else serious_words(int(self.rows[i + status]))
-            if not words:
-                continue
-            is_next = bool(found) and time - found[-1][1] <= gap
-            begin, said = (found[-1][0], found.pop()[2]) if is_next else (time, {})
-            found.append((begin, time, said | dict.fromkeys(words)))
-        return [(begin, end, '; '.join(said)) for begin, end, said in found]
+        time, estimate, status = self._columns('time', 'estimate', 'status')
+        newest = np.maximum.accumulate(np.where(np.isnan(estimate), -math.inf, time))
+        silent = np.isfinite(newest) & (time - newest > TOO_OLD)
+        bits = np.where(silent, 0, status.astype(np.int64) & _SERIOUS)
+        wrong = np.flatnonzero(silent | (bits != 0))
+        found = []
+        for places in np.split(wrong, np.flatnonzero(np.diff(time[wrong]) > gap) + 1) if len(wrong) else ():
+            words = ['no estimate'] * bool(silent[places].any())
+            words += serious_words(int(np.bitwise_or.reduce(bits[places])))
+            found.append((float(time[places[0]]), float(time[places[-1]]), '; '.join(words)))
+        return found
 
     def findings(self, held: Held, *, is_end: bool) -> list[Finding]:
         """Findings on the run up to a moment."""
@@ -114,7 +134,7 @@ def _as_row(values: 'array[float]') -> Row:
 
 
 class RecordedView:
-    """A bag, sampled at the pace of the live view.
+    """A bag, sampled at the pace of the live view: to its first estimate at once, the rest by `load`.
 
     Args:
         bag: The bag.
@@ -126,50 +146,70 @@ class RecordedView:
     """
 
     def __init__(self, bag: Path, mapping: MappingFile | None = None) -> None:
-        self._name = bag.resolve().name
+        self._bag, self._lock = bag, threading.Lock()
         known = bag_topics(bag)
         types = {topic: info.type_name for topic, info in known.items() if info.message_count}
         answers = (ESTIMATE_TYPE, MACHINE_TYPE)
+        if not types:
+            raise BagError(f'{bag}: no message in it, so nothing to estimate from')
         if mapping is not None:
             types = {topic: kind for topic, kind in types.items() if topic in mapping.file.topics}
             types[MACHINE_CONFIGURATION] = CONFIGURATION_TYPE
         elif not any(kind in answers for kind in types.values()):
             raise BagError(f'{bag}: no estimates in it: add them with seal_friction replay {bag} --out BAG')
         self._nodes = _nodes(bag, types)
+        self._acted = {topic for topic in known if topic.endswith(RECORDED)}
         self._tracks: dict[str, _Track] = {}
-        total = sum(info.message_count for info in known.values())
-        first, last = _span(bag)
-        messages = machine_messages(bag, mapping)
-        self._first, self._duration = first, max((last - first) * 1e-9, 0.0)
+        self._first = next((message.log_time for message in read_messages(bag) if message.log_time), 0)
+        self._duration = max((bag_end(bag) - self._first) * 1e-9, 0.0)
         self._period = max(1.0 / RATE, self._duration / MOST_ROWS)
-        self._fill(messages, known, total)
+        self._read_until, self._is_read, self._failure = 0.0, False, ''
+        self._rows = self._sampled(machine_messages(bag, mapping))
+        while not self._is_read and not any(track.first < math.inf for track in self._tracks.values()):
+            self._read_row()
         if not self._tracks:
             reason = next((view.refused for view, _ in self._nodes if view.refused), 'there is none')
             raise BagError(f'{bag}: the configuration of the estimator in it cannot be read: {reason}')
 
-    def _fill(self, messages: Iterable[BagMessage], known: dict[str, TopicInfo], total: int) -> None:
-        step = round(self._period * 1e9)
-        due, acted = self._first + step, {topic for topic in known if topic.endswith(RECORDED)}
-        with progress(f'read {self._name}', total) as advance:
-            for count, message in enumerate(messages, start=1):
-                while message.log_time > due:
-                    self._sample(due)
-                    due += step
-                self._take(message, acted)
-                if count % 1000 == 0:
-                    advance(1000)
-        self._sample(due)
+    def load(self) -> 'RecordedView':
+        """Read the rest, while the page may ask for what has been read; damage ends it, and the page says so."""
+        try:
+            while not self._is_read:
+                with self._lock:
+                    end = time.monotonic() + _SLICE
+                    while not self._is_read and time.monotonic() < end:
+                        self._read_row()
+                time.sleep(_PAUSE)  # else who waits for the lock does not get it
+        except ValueError as error:
+            self._failure, self._is_read = str(error), True
+        return self
 
-    def _take(self, message: BagMessage, acted: set[str]) -> None:
+    def _read_row(self) -> None:
+        until = next(self._rows, None)
+        self._is_read = until is None
+        self._read_until = self._read_until if until is None else until
+
+    def _sampled(self, messages: Iterable[BagMessage]) -> Iterator[float]:
+        """Take the messages; the time of each row that is made of them [s]."""
+        step = round(self._period * 1e9)
+        due = self._first + step
+        for message in messages:
+            while message.log_time > due:
+                yield self._sample(due)
+                due += step
+            self._take(message)
+        yield self._sample(due)
+
+    def _take(self, message: BagMessage) -> None:
         """Take a message of a node; the feed-forward that acted counts, not that of a replay."""
         topic = message.topic.removesuffix(RECORDED)
-        if topic + RECORDED in acted and topic == message.topic:
+        if topic + RECORDED in self._acted and topic == message.topic:
             return
         for view, topics in self._nodes:
             if not topics or topic in topics:
                 view.take(topic, message.type_name, message.data, message.log_time)
 
-    def _sample(self, now: int) -> None:
+    def _sample(self, now: int) -> float:
         time = (now - self._first) * 1e-9
         number = round(time / self._period) - 1
         for view, _ in self._nodes:
@@ -177,47 +217,51 @@ class RecordedView:
                 track = self._tracks.setdefault(view.label(actuator), _Track(number, view, actuator))
                 track.add(known, view.held[actuator], time, now - round(self._period * 1e9))
                 view.held[actuator] = next_interval(view.held[actuator])
+        return time
 
     # --- for the page ---
 
     def describe(self) -> dict[str, Any]:
-        """What does not change."""
-        about = {'mode': 'bag', 'name': self._name, 'columns': COLUMNS, 'can_change': False, 'start': str(self._first)}
+        """What does not change, and what has been read; ``loaded`` [s] is the duration once all is."""
+        name = self._bag.resolve().name
+        about = {'mode': 'bag', 'name': name, 'columns': COLUMNS, 'can_change': False, 'start': str(self._first)}
         gap = max(RECENT, 2.0 * self._period, self._duration / _MOST_MARKS)
-        return {
-            **about,
-            'duration': round(self._duration, 3),
-            'period': self._period,
-            'first': min(*(track.first for track in self._tracks.values()), self._duration),
-            'faults': {label: track.faults(gap) for label, track in self._tracks.items()},
-        }
+        with self._lock:
+            tracks = self._tracks.items()
+            return {
+                **about,
+                'duration': round(self._duration, 3),
+                'period': self._period,
+                'loaded': round(self._duration if self._is_read else self._end, 3),
+                'first': min(*(track.first for _, track in tracks), self._duration),
+                'faults': {label: track.faults(gap) for label, track in tracks},
+                'overview': {label: track.overview() for label, track in tracks},
+            }
+
+    @property
+    def _end(self) -> float:
+        return min(self._read_until, self._duration)
 
     def view(self, label: str, since: float, until: float | None = None) -> dict[str, Any]:
         """Rows of an actuator in ``since`` to ``until`` [s], and the situation of all at ``until``."""
-        label = label if label in self._tracks else next(iter(self._tracks))
-        end = self._duration if until is None else min(max(until, 0.0), self._duration)
-        last = round(end / self._period) - 1
-        first = max(math.floor(since / self._period), last - _MOST_ROWS_AT_ONCE)
-        every = {name: self._situation(track, last) for name, track in self._tracks.items()}
-        return {
-            'label': label,
-            'time': round(end, 3),
-            'rows': self._tracks[label].slice(first, max(last, 0)),
-            'now': every[label],
-            'node': self._name,
-            'actuators': [
-                {'label': name, 'verdict': one['verdict'], 'feedforward': one['feedforward']}
-                for name, one in every.items()
-            ],
-            'diagnostics': [],
-        }
+        with self._lock:
+            label = label if label in self._tracks else next(iter(self._tracks))
+            end = self._end if until is None else min(max(until, 0.0), self._end)
+            last = round(end / self._period) - 1
+            first = max(math.floor(since / self._period), last - _MOST_ROWS_AT_ONCE)
+            every = {name: self._situation(track, last) for name, track in self._tracks.items()}
+            rows = self._tracks[label].slice(first, max(last, 0))
+        return frame(label, end, rows, every, node=self._bag.resolve().name, diagnostics=[])
 
     def _situation(self, track: _Track, last: int) -> dict[str, Any]:
         """Words of the moment at a row or up to `_ROWS_A_MOMENT` rows before."""
         place, known, held = track.moment(last)
         rows = track.slice(place - 100, place)
         time = rows[-1][0]
-        found = track.findings(held, is_end=last >= round(self._duration / self._period) - 1)
+        is_end = self._is_read and last >= round(self._end / self._period) - 1
+        found = track.findings(held, is_end=is_end)
+        if self._failure:
+            found = [Finding(BAD, f'not read to its end: {self._failure}', 'use seal_friction recover'), *found]
         now = self._first + round(time * 1e9)
         return situation(known, held, recent_bits(reversed(rows), time), now, findings=found)
 
@@ -238,15 +282,6 @@ class RecordedView:
     def lift(self) -> list[Answer]:
         """Nothing in a bag is switched off."""
         return self.off()
-
-
-def _span(bag: Path) -> tuple[int, int]:
-    """Time of the first and the last message that has one [ns]."""
-    first = last = 0
-    for message in read_messages(bag):
-        first = first or message.log_time
-        last = max(last, message.log_time)
-    return first, last
 
 
 def _nodes(bag: Path, types: dict[str, str]) -> list[tuple[NodeView, set[str]]]:

@@ -15,15 +15,17 @@ import threading
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from http import HTTPStatus
-from typing import Any, Protocol
+from typing import Any
 
 from tornado.httpserver import HTTPServer
 from tornado.iostream import StreamClosedError
 from tornado.web import Application, HTTPError, RequestHandler
 
 from seal_friction_ros.core.foundation.documents import parse_json
+from seal_friction_ros.offline.monitor.live_view import LiveView
 from seal_friction_ros.offline.monitor.off_latch import Answer
 from seal_friction_ros.offline.monitor.page import make_page
+from seal_friction_ros.offline.monitor.recorded_view import RecordedView
 from seal_friction_ros.offline.monitor.token_file import new_token
 
 ADDRESS = '127.0.0.1'
@@ -33,25 +35,6 @@ FRAME_PERIOD = 0.05  # [s] 20 frames a second
 MOST_STREAMS = 5  # browser windows at a time; a browser opens no more than six connections to a server
 _MOST_BYTES = 4096  # of a request to change something
 _TIMEOUT = 10.0  # [s] a browser that takes or sends nothing for so long is left
-
-
-class View(Protocol):
-    """What the server shows: `LiveView` or `RecordedView`."""
-
-    def describe(self) -> dict[str, Any]:
-        """What does not change from frame to frame."""
-
-    def view(self, label: str, since: float, until: float | None = None) -> dict[str, Any]:
-        """Rows of an actuator and the situation of all."""
-
-    def change(self, label: str, parameter: str, value: float) -> list[Answer]:
-        """Set a parameter."""
-
-    def off(self) -> list[Answer]:
-        """Switch every feed-forward off, and keep it so."""
-
-    def lift(self) -> list[Answer]:
-        """End OFF."""
 
 
 class RefusalError(HTTPError):
@@ -74,7 +57,7 @@ class MonitorServer:
         ValueError: The port is in use.
     """
 
-    def __init__(self, view: View, port: int = 0, token: str = '') -> None:
+    def __init__(self, view: LiveView | RecordedView, port: int = 0, token: str = '') -> None:
         self.shown = view
         self.token = token or new_token()
         self.page, self.policy = make_page()

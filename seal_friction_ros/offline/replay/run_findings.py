@@ -47,15 +47,17 @@ def run_findings(
     )
     compensated = tracking.compensated if tracking else None
     if compensated is not None and compensated.rms_change is not None:
-        return [*_raised(compensated.rms, compensated.rms_change), *found]
+        return [*raised(tracking), *found]
     if np.isfinite(run.reference).any():
         return [one._replace(next=_TUNE) if one.level == GOOD else one for one in found]
     return found
 
 
-def _raised(rms: float, change: float) -> Iterator[Finding]:
-    if change > 0.0:
-        what = f'the feed-forward raises the tracking error by {change:.1f} % to {rms / UM:.0f} µm RMS'
+def raised(tracking: TrackingEvaluation | None) -> Iterator[Finding]:
+    """The finding that the feed-forward raises the tracking error, where it does."""
+    found = tracking.compensated if tracking else None
+    if found is not None and (change := found.rms_change or 0.0) > 0.0:
+        what = f'the feed-forward raises the tracking error by {change:.1f} % to {found.rms / UM:.0f} µm RMS'
         yield Finding(BAD, what, f'set feedforward.scale to 0, then {_TUNE}', 0.01 * change)
 
 

@@ -5,7 +5,8 @@ servo without it. The definitions of settled, of periodic and of the same refere
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -96,15 +97,70 @@ class TrackingEvaluation:
         return next(reversed(comparable or active), None)
 
 
+class _Axis(NamedTuple):
+    """What the tracking is evaluated from, as of `RecordedRun`."""
+
+    time: FloatArray
+    velocity: FloatArray
+    position: FloatArray
+    reference: FloatArray
+    state: IntArray
+    feedforward_force: FloatArray
+    replayed_force: FloatArray | None
+
+
 def evaluate_tracking(run: RecordedRun) -> TrackingEvaluation | None:
     """Tracking in each stretch between two changes of configuration; None without reference or position.
 
     The longest part of a stretch without a gap in either above `MAX_GAP` is evaluated. Its first ``fade_time`` +
     `SETTLING_TIME` are left out; of a periodic reference, whole periods are evaluated.
     """
+    return _tracking_of(_Axis(*(getattr(run, name) for name in _Axis._fields)), configuration_stretches(run))
+
+
+class TrackingFollower:
+    """Tracking of a stream, by a sample each `PERIOD`.
+
+    Args:
+        kept: So long a sample counts [s].
+    """
+
+    PERIOD = 0.01  # [s] 20 samples of a period at 5 Hz (our choice)
+
+    def __init__(self, kept: float) -> None:
+        self._kept = kept
+        self._rows: deque[tuple[float, ...]] = deque()
+        self._changes: list[tuple[float, Snapshot]] = []
+
+    def configure(self, snapshot: Snapshot) -> None:
+        """Take a configuration; the tracking of a replay is not told: what it computes did not act."""
+        begin = self._rows[-1][0] if self._rows else -math.inf
+        if not self._changes or snapshot[:1] + snapshot[3:] != self._changes[-1][1][:1] + self._changes[-1][1][3:]:
+            self._changes.append((begin, snapshot))
+
+    def add(self, row: tuple[float, ...]) -> None:
+        """Take one estimate: time [s], velocity, position, reference, state and feed-forward force."""
+        if self._rows and 0.0 <= row[0] - self._rows[-1][0] < 0.99 * self.PERIOD:
+            return
+        self._rows.append(row)
+        while self._rows[0][0] < row[0] - self._kept:
+            self._rows.popleft()
+
+    def evaluation(self) -> TrackingEvaluation | None:
+        """As of `evaluate_tracking`."""
+        if not self._rows or any(snapshot.recorded is not None for _, snapshot in self._changes):
+            return None
+        time, velocity, position, reference, state, force = np.array(self._rows).T
+        rows = [int(np.searchsorted(time, begin, side='right')) for begin, _ in self._changes]
+        changes = zip([0, *rows], [None, *(snapshot for _, snapshot in self._changes)], strict=True)
+        axis = _Axis(time, velocity, position, reference, state.astype(np.int64), force, None)
+        return _tracking_of(axis, _stretches(list(changes), len(time)))
+
+
+def _tracking_of(run: _Axis, stretches: Iterable[tuple[int, int, Snapshot | None]]) -> TrackingEvaluation | None:
     if not np.isfinite(run.reference - run.position).any():
         return None
-    evaluated = [_evaluate(run, *stretch) for stretch in configuration_stretches(run)]
+    evaluated = [_evaluate(run, *stretch) for stretch in stretches]
     found = tuple(stretch for stretch in evaluated if stretch is not None)
     base = TrackingEvaluation(found, ()).without
     compared = tuple(_compared(stretch, base) for stretch in found)
@@ -127,12 +183,18 @@ def configuration_stretches(run: RecordedRun) -> Iterator[tuple[int, int, Snapsh
         last = changes[-1][1]
         if snapshot is None or last is None or snapshot[:1] + snapshot[3:] != last[:1] + last[3:]:
             changes.append((row, snapshot))
-    for (first, snapshot), (end, _) in pairwise([*changes, (len(run.time), None)]):
+    return _stretches(changes, len(run.time))
+
+
+def _stretches(
+    changes: Sequence[tuple[int, Snapshot | None]], count: int
+) -> Iterator[tuple[int, int, Snapshot | None]]:
+    for (first, snapshot), (end, _) in pairwise([*changes, (count, None)]):
         if end > first:
             yield first, end, snapshot
 
 
-def _evaluate(run: RecordedRun, first: int, end: int, snapshot: Snapshot | None) -> TrackingStretch | None:
+def _evaluate(run: _Axis, first: int, end: int, snapshot: Snapshot | None) -> TrackingStretch | None:
     """Numbers of one stretch; None if it is too short."""
     settings = (snapshot.recorded or snapshot.configuration).feedforward if snapshot else None
     estimator_settings = snapshot.configuration.settings if snapshot else EstimatorSettings()
@@ -175,7 +237,7 @@ def _evaluate(run: RecordedRun, first: int, end: int, snapshot: Snapshot | None)
     )
 
 
-def _longest_part(run: RecordedRun, first: int, end: int) -> IntArray:
+def _longest_part(run: _Axis, first: int, end: int) -> IntArray:
     """Indices of the longest part, in time, without a gap in reference and position above `MAX_GAP`."""
     known = first + np.flatnonzero(np.isfinite(run.reference[first:end] - run.position[first:end]))
     if not len(known):

@@ -22,7 +22,7 @@ from seal_friction_ros.offline.reports import bag_evaluation
 from seal_friction_ros.offline.reports.bag_evaluation import BagEvaluation
 from seal_friction_ros.offline.reports.bag_figures import run_figures
 from seal_friction_ros.offline.reports.figure_style import house_style
-from seal_friction_ros.offline.reports.formatting import force_unit, length_text, number
+from seal_friction_ros.offline.reports.formatting import FIRST_DATE, date_text, force_unit, length_text, number
 from seal_friction_ros.offline.reports.page import (
     PARAMETER_HEADS,
     Columns,
@@ -35,7 +35,6 @@ from seal_friction_ros.offline.reports.page import (
 )
 from seal_friction_ros.offline.reports.tracking_figures import stretch_name, tracking_plots, tracking_summary
 
-_FIRST_DATE = 86_400_000_000_000 * 365  # [ns] a stamp before 1971 is no date (our choice)
 _SHOWN_CONFIGURATIONS = 2  # so many of the first and of the last, in a bag with more
 
 
@@ -97,9 +96,8 @@ def write_report(bag: Path, out: Path, namespace: str = '', mapping: MappingFile
 
 def data_date(stamp: int) -> str:
     """Date of a stamp [ns] as text; a stamp near 0 is that of a clock which began there."""
-    if stamp < _FIRST_DATE:
-        return 'data without a date'
-    return f'data of {datetime.fromtimestamp(stamp // 1_000_000_000, UTC):%Y-%m-%d %H:%M} UTC'
+    time = stamp * 1e-9
+    return 'data without a date' if time < FIRST_DATE else f'data of {date_text(time)} UTC'
 
 
 def mounted_seals(run: RecordedRun) -> list[str]:

@@ -3,7 +3,6 @@
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import quote
@@ -16,12 +15,12 @@ from seal_friction_ros.offline.replay.bag_summary import DIFFERENT, BagSummary
 from seal_friction_ros.offline.replay.health_indicators import NOT_TOLD, Value, trend
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
+from seal_friction_ros.offline.reports.formatting import FIRST_DATE, date_text
 from seal_friction_ros.offline.reports.page import ReportSummary, head_of, script, write_page
 from seal_friction_ros.offline.work.outcome import Outcome
 from seal_friction_ros.offline.work.places import Place
 
 HOURS_A_DAY = 24.0
-FIRST_DATE = 365.0 * 86400.0  # [s] a stamp before 1971 is no date (our choice)
 _COLOURS = (style.VERMILLION, style.BLUE, style.GREEN, style.ORANGE, style.PURPLE, style.SKY)
 _MOST_NAMED = 3  # rigs in the verdict
 FEWEST_BAGS = 4  # with a date, that tell a change of a rig (our choice)
@@ -100,7 +99,7 @@ def _rig(name: str, bags: Sequence[FleetBag]) -> Rig:
     change, since = _change(points)
     level = worst([bag.level for bag in bags] + ([] if math.isnan(change) else [LOOK]))
     worst_bags = [bag.why for bag in bags if bag.level == level and level != GOOD]
-    why = [] if math.isnan(change) else [f'friction {change:+.0%} since {_date(since)[:10]}']
+    why = [] if math.isnan(change) else [f'friction {change:+.0%} since {date_text(since)[:10]}']
     why += [f'{len(worst_bags)} of {len(bags)} bags {level}: {worst_bags[-1]}'] if worst_bags else []
     scales = [one.scale for one in seen if math.isfinite(one.scale)]
     shares = [one.disagreeing for one in seen if math.isfinite(one.disagreeing)]
@@ -200,13 +199,6 @@ def _verdict(bags: Sequence[FleetBag], rigs: Sequence[Rig]) -> Verdict:
     return Verdict(level, text, 'seal_friction report BAG --out PAGE.html shows a bag in full.')
 
 
-def _date(start: float) -> str:
-    try:
-        return f'{datetime.fromtimestamp(start, UTC):%Y-%m-%d %H:%M}'
-    except (ValueError, OverflowError, OSError):
-        return 'not told'
-
-
 def _text(value: float, form: str = '.3g') -> str:
     return f'{value:{form}}' if math.isfinite(value) else 'not told'
 
@@ -216,7 +208,7 @@ _COLUMNS = (
     ('drift', 'drift', lambda value: _text(value, '+.1%')),
     ('disagrees', 'disagreeing', lambda value: _text(value, '.1%')),
     ('residual / friction', 'residual', lambda value: _text(value, '.1%')),
-    ('start (UTC)', 'start', _date),
+    ('start (UTC)', 'start', date_text),
     ('duration [s]', 'duration', lambda value: _text(value, '.1f')),
     ('replay', 'replay', str),
     ('offset [N]', 'offset', _text),
@@ -262,5 +254,5 @@ def _figure(bags: Sequence[FleetBag], rigs: Sequence[Rig]) -> Plot:
             look = {'color': _COLOURS[number], 'label': Path(name).name} if named else {}
             axes.plot(days, scales, 'o-', ms=3.0, lw=1.2, zorder=3.0 - 0.01 * number, **({'color': style.GREY} | look))
     axes.axhline(1.0, color=style.GREY, lw=0.8)
-    axes.set_xlabel(f'days since {_date(begin)[:10]}' if begin else 'no bag has a date')
+    axes.set_xlabel(f'days since {date_text(begin)[:10]}' if begin else 'no bag has a date')
     return finished('scale', figure, axes, ylabel='friction / seal file [-]')

@@ -1,9 +1,11 @@
 """Numbers and quantities as text, the same on pages and in figures."""
 
 import math
+from datetime import UTC, datetime
 
 from seal_friction_ros.core.foundation.units import BAR, MM, PSI, UM
 
+FIRST_DATE = 365.0 * 86_400.0  # [s] a stamp before 1971 is no date (our choice)
 MINUS, DASH = '\N{MINUS SIGN}', '\N{EN DASH}'
 
 
@@ -18,6 +20,14 @@ def number(value: float | None, digits: int = 2, *, unit: float = 1.0, signed: b
 def thousands(count: int) -> str:
     """Count with its digits in groups of three."""
     return f'{count:,}'.replace(',', '\N{THIN SPACE}')
+
+
+def date_text(time: float) -> str:
+    """Date and time of a stamp [s], UTC."""
+    try:
+        return f'{datetime.fromtimestamp(time, UTC):%Y-%m-%d %H:%M}'
+    except (ValueError, OverflowError, OSError):
+        return 'not told'
 
 
 def signed_percent(share: float) -> str:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -11,20 +10,11 @@ import numpy as np
 from seal_friction_ros.core.estimation.findings import LOOK, Finding, Limits, Verdict, verdict_of
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.offline.replay.bag_health import BagHealth
-from seal_friction_ros.offline.replay.health_indicators import (
-    HOUR,
-    Day,
-    Value,
-    alarms_of,
-    changes_of,
-    day_of,
-    trend,
-)
+from seal_friction_ros.offline.replay.health_indicators import Day, Value, alarms_of, changes_of, day_of, trend
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
+from seal_friction_ros.offline.reports.formatting import FIRST_DATE, date_text
 from seal_friction_ros.offline.reports.page import ReportSummary, Table, head_of, write_page
-
-_FIRST_DATE = 365.0 * 24.0 * HOUR  # [s] a stamp before 1971 is no date (our choice)
 
 INDICATORS = {
     'scale': ('friction / file', '-'),
@@ -111,7 +101,7 @@ def _verdict(
 
 def _dates(days: Sequence[Day]) -> tuple[str, ...]:
     """Dates of the data, first to last."""
-    known = [f'{datetime.fromtimestamp(day.time, UTC):%Y-%m-%d}' for day in days if day.time > _FIRST_DATE]
+    known = [date_text(day.time)[:10] for day in days if day.time > FIRST_DATE]
     return (f'data of {" to ".join(dict.fromkeys((known[0], known[-1])))}',) if known else ('data without a date',)
 
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.stats import binom
 
-from seal_friction_ros.core.estimation.findings import Verdict
+from seal_friction_ros.core.estimation.findings import GOOD, LOOK, Verdict, between, percent, worst
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import BAR, MM
@@ -91,7 +91,7 @@ def _verdict(found: Identification, files: Sequence[str]) -> Verdict:
         total = float(told.friction.sum())
         parts = zip(found.data.kinds, told.friction.tolist(), told.apart_std.tolist(), strict=True)
         shares = [(kind.name, friction / total, std / total) for kind, friction, std in parts]
-        return verdicts.of_kinds(selection.validation.error, shares, files)
+        return _verdict_on_kinds(selection.validation.error, shares, files)
     numbers = verdicts.IdentificationNumbers(
         law=selection.law.name,
         error=selection.validation.error,
@@ -103,6 +103,18 @@ def _verdict(found: Identification, files: Sequence[str]) -> Verdict:
         drifted=any(level.is_used and abs(level.drift) > diagnostics.SETTLED for level in found.levels),
     )
     return verdicts.of_identification(numbers)
+
+
+def _verdict_on_kinds(error: float, shares: Sequence[tuple[str, float, float]], files: Sequence[str]) -> Verdict:
+    """By the error on left-out readings, and name, share in the friction and its deviation of each kind [-]."""
+    apart = LOOK if max(std for _, _, std in shares) > verdicts.WIDE_BAND else GOOD
+    level = worst([between(error, verdicts.SMALL_ERROR, verdicts.LARGE_ERROR), apart])
+    each = ', '.join(f'{name} {percent(share)} (standard deviation {percent(std)})' for name, share, std in shares)
+    text = f'Shares of the friction: {each}. Readings that the fit did not see are off by {percent(error)} on average.'
+    after = f'use the seal files together: seals: [{", ".join(files)}].'
+    return Verdict(
+        level, text, after if level == GOOD else f'drive the pressures that are proposed below; until then {after}'
+    )
 
 
 # -- tables -----------------------------------------------------------------------------------------------------------

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import FuncFormatter
 
+from seal_friction_ros.core.estimation.findings import LOOK, Verdict, percent
 from seal_friction_ros.core.foundation.units import BAR, MM
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
 from seal_friction_ros.offline.contact.lubrication_runs import MARKED_MESH_ERROR, MapRuns
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty
 from seal_friction_ros.offline.reports import figure_style as style
-from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, house_style
 from seal_friction_ros.offline.reports.formatting import number
 from seal_friction_ros.offline.reports.page import PARAMETER_HEADS, Table, head_of, parameter_rows, write_page
@@ -44,12 +44,14 @@ def write_map_page(computed: MapRuns, out: Path) -> tuple[Path, ...]:
     if computed.uncertainty is not None:
         plots.append(quantiles_figure(computed.uncertainty))
     frictions = np.concatenate([row.friction for row in computed.rows])
-    verdict = verdicts.of_map(
-        float(frictions.min()),
-        float(frictions.max()),
-        None if computed.uncertainty is None else computed.uncertainty.relative_std,
-        '--seal-file' in command_line(),
-    )
+    spread = ''
+    if computed.uncertainty is not None:
+        spread = f', with a relative standard deviation of {percent(computed.uncertainty.relative_std)} by samples'
+    text = f'Friction {frictions.min():.3g} to {frictions.max():.3g} N over the map{spread}; computed, not measured.'
+    after = 'write a seal file for the node: --seal-file.'
+    if '--seal-file' in command_line():
+        after = 'use the seal file; its band is not from measurements.'
+    verdict = Verdict(LOOK, text, after)
     values = {
         'verdict': verdict,
         'law': computed.law,

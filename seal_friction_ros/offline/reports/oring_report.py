@@ -12,7 +12,7 @@ from matplotlib import colormaps
 from matplotlib.collections import PolyCollection
 from matplotlib.patches import Rectangle
 
-from seal_friction_ros.core.estimation.findings import Verdict
+from seal_friction_ros.core.estimation.findings import GOOD, Verdict, between, percent, worst
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.units import BAR, INCH, LBF, MM, MPA, PSI
 from seal_friction_ros.core.friction.geometry import projected_area, squeeze, stretch
@@ -22,7 +22,6 @@ from seal_friction_ros.core.oring_contact.results import OringResult, WallContac
 from seal_friction_ros.offline.contact.oring_runs import Computed, sliding_contact
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty
 from seal_friction_ros.offline.reports import figure_style as style
-from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, number, pressure_text
 from seal_friction_ros.offline.reports.page import Table, head_of, write_page
@@ -110,15 +109,21 @@ def write_oring_report(computed: Computed, out: Path, uncertainty: Uncertainty |
 
 
 def _verdict(computed: Computed) -> Verdict:
+    """By the largest deviation of the axial force from pressure times area, and the largest loss of volume [-]."""
     area, summary = projected_area(computed.file.case.geometry), computed.summary
     loaded = [result for result in computed.results if result.pressure]
-    return verdicts.of_oring(
-        summary.normal_force_N,
-        summary.pressure_Pa,
-        max((abs(result.axial_force / (result.pressure * area) - 1.0) for result in loaded), default=0.0),
-        max(abs(1.0 - result.volume_ratio) for result in computed.results),
-        bool(summary.friction_N),
-    )
+    balance = max((abs(result.axial_force / (result.pressure * area) - 1.0) for result in loaded), default=0.0)
+    lost = max(abs(1.0 - result.volume_ratio) for result in computed.results)
+    pairs = zip(summary.normal_force_N, summary.pressure_Pa, strict=True)
+    first, *others = (f'{force:.3g} N at {pressure / BAR:.3g} bar' for force, pressure in pairs)
+    span = ' to '.join([first, *others[-1:]])
+    text = f'Normal force {span}; forces balance within {percent(balance)}, volume within {percent(lost)}.'
+    level = worst([between(balance, 0.02, 0.1), between(lost, 0.01, 0.03)])
+    if level != GOOD:
+        return Verdict(level, text, 'compute with more lines (numerics.lines of the case) and compare.')
+    if not summary.friction_N:
+        return Verdict(level, text, 'add a coefficient of friction to the case for friction.')
+    return Verdict(level, text, 'measure a few readings and compare: the modulus decides.')
 
 
 # -- tables -----------------------------------------------------------------------------------------------------------
@@ -184,10 +189,10 @@ def _friction_table(computed: Computed) -> Table:
         return Table(heads, ())
     rows = []
     off = friction_deviation(computed, measured)
-    for pressure, friction, percent in zip(measured.pressures, measured.frictions, off.tolist(), strict=True):
+    for pressure, friction, share in zip(measured.pressures, measured.frictions, off.tolist(), strict=True):
         each = friction / measured.seals
-        own = each * (1.0 + percent / 100.0)
-        rows.append((number(pressure / BAR), number(each), number(own), number(percent, 1, signed=True)))
+        own = each * (1.0 + share / 100.0)
+        rows.append((number(pressure / BAR), number(each), number(own), number(share, 1, signed=True)))
     return Table(heads, rows)
 
 

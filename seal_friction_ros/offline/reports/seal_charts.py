@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from seal_friction_ros.core.estimation.configuration import PLACEHOLDER
-from seal_friction_ros.core.estimation.findings import Verdict
+from seal_friction_ros.core.estimation.findings import BAD, GOOD, LOOK, NAME_SEALS, Verdict, percent
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import BAR, INCH, LBF, MM, PSI
@@ -143,17 +143,22 @@ def write_seal_charts(seal: Path, out: Path) -> ChartsSummary:
 
 
 def _verdict(shown: ChartedSeal) -> Verdict:
-    at_most = shown.friction(shown.seal.pressure_max)
-    pressures, measured = _compared(shown)
-    off = [abs(shown.friction(p).coulomb_friction / mean - 1.0) for p, mean in zip(pressures, measured, strict=False)]
-    return verdicts.of_seal(
-        shown.seal.name,
-        at_most.coulomb_friction,
-        shown.seal.pressure_max,
-        at_most.coulomb_friction_std / at_most.coulomb_friction,
-        is_placeholder=shown.seal.name == PLACEHOLDER,
-        off=max(off, default=None),
+    """By the standard deviation at the highest identified pressure; with the largest deviation from the tests."""
+    name, pressure = shown.seal.name, shown.seal.pressure_max
+    if name == PLACEHOLDER:
+        return Verdict(BAD, 'Placeholder: its numbers are those of another seal.', f'{NAME_SEALS}.')
+    pairs = zip(*_compared(shown), strict=False)
+    off = [abs(shown.friction(p).coulomb_friction / mean - 1.0) for p, mean in pairs]
+    tested = f', within {percent(max(off))} of the mean of the tests' if off else ''
+    at_most = shown.friction(pressure)
+    friction, std = at_most.coulomb_friction, at_most.coulomb_friction_std / at_most.coulomb_friction
+    text = (
+        f'{friction:.3g} N of Coulomb friction at {pressure / BAR:.3g} bar, standard deviation {percent(std)}{tested}.'
     )
+    if std > verdicts.WIDE_BAND:
+        after = 'the band is wide: fit it to readings of your machine (docs/identification.md).'
+        return Verdict(LOOK, text, after)
+    return Verdict(GOOD, text, f'use it: seals: [{name}].')
 
 
 # -- the data under the figures ---------------------------------------------------------------------------------------

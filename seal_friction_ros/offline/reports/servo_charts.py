@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from seal_friction_ros.core.estimation.configuration import SealSelection
+from seal_friction_ros.core.estimation.findings import GOOD, LOOK, Verdict, percent
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.foundation.units import BAR, MM, MS, UM
 from seal_friction_ros.core.servo.closed_loop import SETTLING_PERIODS
@@ -17,7 +18,6 @@ from seal_friction_ros.core.servo.position_servo import ServoParameters, Traject
 from seal_friction_ros.core.servo.tracking import dwell_per_reversal, tracking_peak, tracking_rms
 from seal_friction_ros.files import load_seals
 from seal_friction_ros.offline.reports import figure_style as style
-from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, length_text, length_unit, number
 from seal_friction_ros.offline.reports.page import (
@@ -110,9 +110,7 @@ def write_servo_charts(
         out,
         'servo',
         [figure_25(rubbing, free, wave), forces_figure(rubbing, wave)],
-        verdict=verdicts.of_servo(
-            rubbing.tracking.dwell, rubbing.tracking.dwell_share, rubbing.tracking.rms, free.tracking.rms
-        ),
+        verdict=_verdict(rubbing.tracking, free.tracking),
         head=head_of('servo', 'simulated, no measured data', seals_text([one.seal.name for one in servo.seals])),
         wave=wave,
         seals=len(servo.seals),
@@ -126,6 +124,18 @@ def write_servo_charts(
     return ServoChartsSummary(
         out, figures, wave.amplitude, wave.frequency, len(servo.seals), rubbing.tracking, free.tracking
     )
+
+
+def _verdict(rubbing: ServoTracking, free: ServoTracking) -> Verdict:
+    if not rubbing.dwell:
+        return Verdict(GOOD, 'The rod reverses without a rest.', 'nothing: friction does not flatten the peaks.')
+    text = (
+        f'Friction flattens the peaks: a rest of {rubbing.dwell / MS:.1f} ms at each reversal, '
+        f'{percent(rubbing.dwell_share)} of a period; the tracking error is {length_text(rubbing.rms)} RMS with '
+        f'friction, {length_text(free.rms)} without.'
+    )
+    level = LOOK if rubbing.rms > free.rms + 0.1 * UM else GOOD
+    return Verdict(level, text, 'compensate it: seal_friction tune --out feedforward.yaml.')
 
 
 def _tracking_table(rubbing: ServoTracking, free: ServoTracking) -> Table:

@@ -18,8 +18,6 @@ from seal_friction_ros.core.estimation.findings import (
     percent,
     worst,
 )
-from seal_friction_ros.core.foundation.units import BAR, UM
-from seal_friction_ros.offline.reports.formatting import length_text
 
 SMALL_ERROR, LARGE_ERROR = 0.1, 0.3  # [-] of friction on data left out: GOOD up to, BAD above
 SMALL_NUMERICS, LARGE_NUMERICS = 0.05, 0.15  # [-] change of friction with a coarser step or grid: likewise
@@ -65,48 +63,6 @@ def of_identification(found: IdentificationNumbers) -> Verdict:
     return Verdict(level, '; '.join([text, *reasons]) + '.', after)
 
 
-def of_kinds(error: float, shares: Sequence[tuple[str, float, float]], files: Sequence[str]) -> Verdict:
-    """Verdict on several kinds of seals that were identified together.
-
-    Args:
-        error: Of left-out readings, relative [-].
-        shares: Name of each kind, its share in the friction and the standard deviation of the share [-].
-        files: Their seal files.
-    """
-    apart = LOOK if max(std for _, _, std in shares) > WIDE_BAND else GOOD
-    level = worst([between(error, SMALL_ERROR, LARGE_ERROR), apart])
-    each = ', '.join(f'{name} {percent(share)} (standard deviation {percent(std)})' for name, share, std in shares)
-    text = f'Shares of the friction: {each}. Readings that the fit did not see are off by {percent(error)} on average.'
-    after = f'use the seal files together: seals: [{", ".join(files)}].'
-    if level != GOOD:
-        after = f'drive the pressures that are proposed below; until then {after}'
-    return Verdict(level, text, after)
-
-
-def of_seal(
-    name: str, friction: float, pressure: float, std: float, *, is_placeholder: bool, off: float | None
-) -> Verdict:
-    """Verdict on a seal file.
-
-    Args:
-        name: Its name.
-        friction: Coulomb friction [N] at the highest identified pressure.
-        pressure: That pressure [Pa].
-        std: Standard deviation there, relative [-].
-        is_placeholder: Whether it is the placeholder.
-        off: Largest deviation from the mean of the tests [-]; None without tests.
-    """
-    if is_placeholder:
-        return Verdict(BAD, 'Placeholder: its numbers are those of another seal.', f'{NAME_SEALS}.')
-    tested = '' if off is None else f', within {percent(off)} of the mean of the tests'
-    level = LOOK if std > WIDE_BAND else GOOD
-    text = (
-        f'{friction:.3g} N of Coulomb friction at {pressure / BAR:.3g} bar, standard deviation {percent(std)}{tested}.'
-    )
-    after = 'the band is wide: fit it to readings of your machine (docs/identification.md).' if level == LOOK else ''
-    return Verdict(level, text, after or f'use it: seals: [{name}].')
-
-
 def of_tuning(
     summary: str, *, is_better: bool, has_placeholder: bool, mass: float | None, fitted: bool, bag: bool
 ) -> Verdict:
@@ -139,67 +95,6 @@ def of_tuning(
     return Verdict(
         GOOD, summary, 'tune on a bag of the machine too (--bag), then start with half of feedforward.scale.'
     )
-
-
-def of_oring(
-    normal: Sequence[float], pressures: Sequence[float], balance: float, volume_lost: float, friction: bool
-) -> Verdict:
-    """Verdict on a computed O-ring.
-
-    Args:
-        normal: Normal force of one seal [N] at each pressure.
-        pressures: Pressures [Pa].
-        balance: Largest deviation of the axial force from pressure times area [-].
-        volume_lost: Largest loss of volume [-].
-        friction: Whether the case has a coefficient of friction.
-    """
-    level = worst([between(balance, 0.02, 0.1), between(volume_lost, 0.01, 0.03)])
-    ends = f'{normal[0]:.3g} N at {pressures[0] / BAR:.3g} bar'
-    if len(normal) > 1:
-        ends += f' to {normal[-1]:.3g} N at {pressures[-1] / BAR:.3g} bar'
-    text = f'Normal force {ends}; forces balance within {percent(balance)}, volume within {percent(volume_lost)}.'
-    if level != GOOD:
-        return Verdict(level, text, 'compute with more lines (numerics.lines of the case) and compare.')
-    after = (
-        'measure a few readings and compare: the modulus decides.'
-        if friction
-        else 'add a coefficient of friction to the case for friction.'
-    )
-    return Verdict(level, text, after)
-
-
-def of_map(lowest: float, highest: float, relative_std: float | None, seal_file: bool) -> Verdict:
-    """Verdict on a friction map.
-
-    Args:
-        lowest: Lowest friction [N].
-        highest: Highest friction [N].
-        relative_std: Relative standard deviation of the friction, from samples; None without samples.
-        seal_file: Whether a seal file is written.
-    """
-    spread = (
-        '' if relative_std is None else f', with a relative standard deviation of {percent(relative_std)} by samples'
-    )
-    after = (
-        'use the seal file; its band is not from measurements.'
-        if seal_file
-        else 'write a seal file for the node: --seal-file.'
-    )
-    return Verdict(
-        LOOK, f'Friction {lowest:.3g} to {highest:.3g} N over the map{spread}; computed, not measured.', after
-    )
-
-
-def of_servo(dwell: float, share: float, with_friction: float, without: float) -> Verdict:
-    """Verdict on the simulated servo: rest [s] and share of a period [-] per reversal, tracking errors RMS [m]."""
-    if not dwell:
-        return Verdict(GOOD, 'The rod reverses without a rest.', 'nothing: friction does not flatten the peaks.')
-    text = (
-        f'Friction flattens the peaks: a rest of {1e3 * dwell:.1f} ms at each reversal, {percent(share)} of a period; '
-        f'the tracking error is {length_text(with_friction)} RMS with friction, {length_text(without)} without.'
-    )
-    level = LOOK if with_friction > without + 0.1 * UM else GOOD
-    return Verdict(level, text, 'compensate it: seal_friction tune --out feedforward.yaml.')
 
 
 def of_runs(changes: Sequence[tuple[str, float, float]], names: tuple[str, str]) -> Verdict:

@@ -1,18 +1,23 @@
 """The view of a bag shows at each moment what had come until then."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from harness.browser import chromium
 from harness.closed_loop_bags import write_closed_loop
 from harness.example_bags import rewrite, write_inputs, write_recorded
+from harness.monitor_process import shown
 from paths import ROOT
 
+from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE, PRESSURE_TYPE
 from seal_friction_ros.offline.bags.bag import BagError, BagMessage, BagWriter, read_messages
 from seal_friction_ros.offline.bags.recorded_run import read_run
 from seal_friction_ros.offline.monitor.actuator_view import COLUMNS, serious_words
 from seal_friction_ros.offline.monitor.recorded_view import RecordedView
+from seal_friction_ros.offline.monitor.server import MonitorServer
 
 
 @pytest.fixture(scope='module')
@@ -37,7 +42,7 @@ def column(view: RecordedView, name: str, since: float = -1.0, until: float = 1e
 )
 def test_a_curve_is_what_another_reader_finds_in_the_bag(loop: Path, name: str, attribute: str, unit: float):
     """Each row has the newest number that had come: those of the bag come every millisecond, the rows every ten."""
-    run, view = read_run(loop), RecordedView(loop)
+    run, view = read_run(loop), RecordedView(loop).load()
     times, values = column(view, 'time'), column(view, name)
     given = np.asarray(getattr(run, attribute)) / unit
     newest = np.searchsorted(run.time, times - 1e-6, side='right') - 1
@@ -49,14 +54,14 @@ def test_a_curve_is_what_another_reader_finds_in_the_bag(loop: Path, name: str, 
 
 
 def test_the_tracking_error_is_reference_less_position(loop: Path):
-    run, view = read_run(loop), RecordedView(loop)
+    run, view = read_run(loop), RecordedView(loop).load()
     assert np.nanmax(np.abs(column(view, 'error'))) == pytest.approx(
         1e6 * np.max(np.abs(run.reference - run.position)), rel=0.05
     )
 
 
 def test_a_window_has_the_rows_in_it_and_the_words_of_its_end(loop: Path):
-    view = RecordedView(loop)
+    view = RecordedView(loop).load()
     frame = view.view('', 0.4, 0.9)
     times = [one[0] for one in frame['rows']]
     assert times[0] == pytest.approx(0.4, abs=0.011)
@@ -66,7 +71,7 @@ def test_a_window_has_the_rows_in_it_and_the_words_of_its_end(loop: Path):
 
 
 def test_faults_are_named_when_they_are_there_and_not_later():
-    view = RecordedView(ROOT / 'bags' / 'faults')
+    view = RecordedView(ROOT / 'bags' / 'faults').load()
     duration = view.describe()['duration']
     words = [view.view('', at, at)['now']['faults'] for at in np.arange(0.1, duration, 0.1)]
     named = {fault for moment in words for fault in moment}
@@ -84,12 +89,12 @@ def test_a_bag_says_where_its_first_estimate_is_and_where_its_faults_are(tmp_pat
         writer.write(*pressure._replace(log_time=messages[0].log_time))
         for message in messages:
             writer.write(*message._replace(log_time=message.log_time + 2 * 10**9))
-    about, late = RecordedView(source).describe(), RecordedView(tmp_path / 'late').describe()
+    about, late = RecordedView(source).load().describe(), RecordedView(tmp_path / 'late').load().describe()
     assert late['first'] == pytest.approx(about['first'] + 2.0, abs=0.03)
     ((label, faults),) = about['faults'].items()
     assert any('pressure is not a finite number' in words for _, _, words in faults)
     assert len(faults) < 200
-    view = RecordedView(source)
+    view = RecordedView(source).load()
     marked = [any(begin <= at <= end for begin, end, _ in faults) for at in np.arange(0.5, about['duration'], 0.01)]
     rows = view.view(label, -1.0)['rows']
     serious = [one[0] for one in rows if serious_words(one[-2])]
@@ -103,27 +108,82 @@ def test_a_stretch_without_estimates_is_a_fault(tmp_path: Path):
     def without(_: int, message: BagMessage) -> BagMessage | None:
         return None if 2.0e9 < message.log_time < 3.0e9 and message.type_name == ESTIMATE_TYPE else message
 
-    view = RecordedView(rewrite(recorded, tmp_path / 'gap', without))
+    view = RecordedView(rewrite(recorded, tmp_path / 'gap', without)).load()
     (faults,) = view.describe()['faults'].values()
     rows = view.view('', -1.0)['rows']  # from 1 s of the bag on
     missing = [one[COLUMNS.index('estimate')] for one in rows if 1.05 < one[0] < 1.95]
     assert missing == [None] * len(missing) != []
     assert any('no estimate' in words and begin <= 1.55 and end >= 1.95 for begin, end, words in faults)
-    (faults,) = RecordedView(recorded).describe()['faults'].values()
+    (faults,) = RecordedView(recorded).load().describe()['faults'].values()
     assert not any('no estimate' in words for _, _, words in faults)
 
 
 def test_what_is_before_the_start_and_after_the_end_is_the_nearest_moment(loop: Path):
-    view = RecordedView(loop)
+    view = RecordedView(loop).load()
     assert view.view('', -5.0, -1.0)['rows']
     assert view.view('', 1e6, 1e6)['time'] == view.describe()['duration']
 
 
 def test_a_long_bag_has_no_more_rows_than_fit(loop: Path, monkeypatch):
     monkeypatch.setattr('seal_friction_ros.offline.monitor.recorded_view.MOST_ROWS', 50)
-    view = RecordedView(loop)
+    view = RecordedView(loop).load()
     assert 45 <= len(column(view, 'time')) <= 52
     assert column(view, 'time')[-1] == pytest.approx(view.describe()['duration'], abs=0.05)
+
+
+def test_a_bag_is_shown_from_its_first_estimate_on_while_the_rest_is_read(loop: Path):
+    view, whole = RecordedView(loop), RecordedView(loop).load().view('', -1.0, 1.0)
+    about = view.describe()
+    assert about['first'] <= about['loaded'] < 0.2 < about['duration']
+    early = view.view('', -1.0, 1.0)
+    assert early['time'] == about['loaded']
+    assert early['rows'] == whole['rows'][: len(early['rows'])] != []
+    view.load()
+    assert view.describe()['loaded'] == about['duration']
+    assert view.view('', -1.0, 1.0) == whole
+
+
+@pytest.mark.skipif(not chromium(), reason='no Chromium: apt-get install chromium')
+def test_the_page_shows_how_far_a_bag_has_been_read_and_follows(loop: Path):
+    view, drawn = RecordedView(loop), 'byId("friction-curve").getBBox().width'
+    server = MonitorServer(view)
+    server.start()
+    try:
+        with shown(server.url, 1400) as page:
+            page.wait_for('byId("clock").textContent.includes("read to") && columns.time.length')
+            assert page.value('columns.time.at(-1)') <= view.describe()['loaded']
+            early = page.value(drawn)
+            view.load()
+            page.wait_for('!byId("clock").textContent.includes("read to")')
+            assert page.value(drawn) > 900.0 > early
+    finally:
+        server.stop()
+
+
+def test_damage_ends_what_is_shown_and_the_verdict_says_so(tmp_path: Path):
+    shutil.copytree(ROOT / 'bags' / 'pull_test', damaged := tmp_path / 'pull_test')
+    (file,) = damaged.glob('*.mcap')
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 255  # in the messages of a chunk
+    file.write_bytes(content)
+    view = RecordedView(damaged).load()
+    now = view.view('', -1.0)['now']
+    assert now['verdict'] == 'bad'
+    assert now['reason'].startswith('not read to its end')
+    assert now['next'] == 'use seal_friction recover'
+
+
+def test_the_overview_has_the_friction_and_the_reversals_of_the_whole_bag(loop: Path):
+    run = read_run(loop)
+    view = RecordedView(loop).load()
+    ((_, overview),) = view.describe()['overview'].items()
+    forces = column(view, 'estimate')
+    time, low, high = np.array(overview['curve'], float).T
+    assert np.all(np.diff(time) > 0.0)
+    assert np.nanmax(high) == np.nanmax(forces) > 0.0
+    assert np.nanmin(low) == np.nanmin(forces) < 0.0
+    sliding = run.direction[run.state == FrictionState.SLIDING]
+    assert len(overview['reversals']) == np.count_nonzero(np.diff(sliding))
 
 
 def test_a_bag_without_estimates_is_refused_with_what_to_do(tmp_path: Path):
@@ -132,7 +192,7 @@ def test_a_bag_without_estimates_is_refused_with_what_to_do(tmp_path: Path):
 
 
 def test_a_bag_cannot_be_changed(tmp_path: Path):
-    view = RecordedView(write_recorded(tmp_path))
+    view = RecordedView(write_recorded(tmp_path)).load()
     assert not view.off()[0].confirmed
     assert not view.change('', 'scale', 0.0)[0].confirmed
     with pytest.raises(ValueError, match='parameter'):

@@ -1,10 +1,12 @@
 """One run has one verdict: the right one, the same on every page, for every command and in the live view."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from harness.closed_loop_bags import write_closed_loop
 from harness.example_bags import as_recorded, rewrite
 from harness.report_page import checked_page
 from harness.simulated_day import Day, write_day
@@ -25,6 +27,8 @@ SEAL = ROOT / 'config' / 'seals' / 'ms28775_114.yaml'
 OWN, PLACEHOLDER = chosen_configuration(None, SEAL), load_configuration(SealSelection(), EstimatorSettings())
 FRICTION = actuator_friction(OWN.parameters().estimator.seals, 3e6, 3e6).coulomb_friction
 SECONDS = 60.0
+HOUR = 3600.0
+TOO_MUCH = 2.0  # [-] scale of a feed-forward
 DAY = replace(Day(FRICTION), dip=0.0, presliding=1e-6)
 
 
@@ -66,6 +70,7 @@ def bags(tmp_path_factory) -> Path:
     record(folder, 'short', seconds=2.5)
     with BagWriter(folder / 'empty'):
         pass
+    write_closed_loop(folder / 'raised', (0.0, TOO_MUCH))
     return folder
 
 
@@ -77,6 +82,8 @@ RUNS = {
     'faults': ('bad', 'the pressure is not a finite number'),
     'wrong_sign': ('bad', 'the force sum is against the motion'),
     'short': ('look', 'a verdict takes 4'),
+    'empty': ('bad', 'nothing to estimate from'),
+    'raised': ('bad', 'the feed-forward raises the tracking error by'),
 }
 """Name of a run -> its verdict, and words of the reason that decides."""
 CHANGES = {'good': 'no change beyond the noise', 'weaker': 'sliding friction -17.0 %'}
@@ -85,7 +92,12 @@ CHANGES = {'good': 'no change beyond the noise', 'weaker': 'sliding friction -17
 
 def told(capsys, *words) -> dict:
     main([*map(str, words), '--json'])
-    return json.loads(capsys.readouterr().out)
+    said = capsys.readouterr()
+    found = json.loads(said.out or '{"errors": [""]}')
+    if found.get('errors'):  # refused
+        assert '\n' not in said.err.strip()
+        raise BagError(said.err)
+    return found
 
 
 def by_report(bags, name, tmp_path, capsys):
@@ -115,30 +127,39 @@ def by_compare(bags, name, tmp_path, capsys):
 
 
 def by_live_view(bags, name, tmp_path, capsys):
-    now = RecordedView(bags / name).view('', -1.0)['now']
+    now = RecordedView(bags / name).load().view('', -1.0)['now']
     return now['verdict'], now['reason']
 
 
 @pytest.mark.parametrize('ask', [by_report, by_fleet, by_health, by_compare, by_live_view])
 @pytest.mark.parametrize('name', RUNS)
 def test_a_run_has_one_verdict_with_the_reason_that_decides(ask, name, bags, tmp_path, capsys):
-    level, reason = ask(bags, name, tmp_path, capsys)
+    try:
+        level, reason = ask(bags, name, tmp_path, capsys)
+    except BagError as error:  # exit code 2
+        level, reason = 'bad', str(error)
     wanted, words = RUNS[name]
     words = CHANGES.get(name, words) if ask is by_compare else words
     assert (level, words.lower() in reason.lower()) == (wanted, True), reason
 
 
-def test_a_bag_without_a_message_is_refused_by_all_in_one_line(bags, tmp_path, capsys):
-    empty, out = bags / 'empty', tmp_path / 'page.html'
-    for words in (('report', empty), ('compare', empty, empty), ('health', empty)):
-        assert main([*map(str, words), '--out', str(out)]) == 2
-        assert 'nothing to estimate from' in capsys.readouterr().err
-    with pytest.raises(BagError, match='no estimates in it'):
-        RecordedView(empty)
-    (tmp_path / 'bags.txt').write_text(str(empty))
-    (bag,) = told(capsys, 'fleet', tmp_path / 'bags.txt', '--out', out, '--workers', '1')['bags']
-    assert bag['level'] == 'bad'
-    assert 'nothing to estimate from' in bag['why']
+@pytest.fixture(scope='module')
+def hour(bags, tmp_path_factory) -> Path:
+    """An hour at 50 Hz whose friction drifts by 15 %, beside the good minute."""
+    folder = tmp_path_factory.mktemp('hour')
+    slow = replace(DAY, period=0.02, stroke_time=2.0, scale=lambda time: 0.93 + 0.15 * time / HOUR)
+    record(folder, 'hour', slow, HOUR)
+    (folder / 'good').symlink_to(bags / 'good')
+    return folder
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('ask', [by_report, by_fleet, by_health, by_compare, by_live_view])
+def test_a_drift_of_15_percent_within_an_hour_is_named(ask, hour, tmp_path, capsys):
+    level, reason = ask(hour, 'hour', tmp_path, capsys)
+    assert level == 'look'
+    (drift,) = map(float, re.findall(r'the friction drifts by \+(\d+) % within 3[56]\d\d s', reason.lower()))
+    assert drift == pytest.approx(15.0, abs=2.0)
 
 
 def test_the_terminal_says_the_verdict_first(bags, tmp_path, capsys):

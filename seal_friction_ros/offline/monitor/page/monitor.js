@@ -15,6 +15,7 @@ const TOO_OLD = 0.5;  // [s]
 const WORDS_PERIOD = 250;  // [ms] numbers that change faster cannot be read
 const KEPT = 30;  // [s] of rows in the page while it follows; while it holds, up to MOST_ROWS
 const MOST_ROWS = 12000;
+const READ_PERIOD = 1000;  // [ms] between two questions how far a bag has been read
 const CAUSES = {node: 'NODE GONE', inputs: 'NO INPUTS', estimate: 'NO ESTIMATE'};
 const EARLIER = 'this page is of an earlier monitor: open the new address, which the command printed';
 const UNANSWERED = 'NOT CONFIRMED: the monitor does not answer; stop the machine another way';
@@ -152,7 +153,7 @@ function series(plot) {
   const [high, low, shade] = plot.band || [];
   const bands = plot.band ? [high, low].map((column) => ({...curve(column, true), stroke: 'transparent', width: 0})) : [];
   const curves = plot.curves.map(([column, , colour, style]) => (
-    {...curve(column), stroke: colour, width: column === 'estimate' ? 2 : 1.5, dash: style === 'dashed' ? [6, 4] : undefined}));
+    {...curve(column), stroke: colour, width: column === 'estimate' ? 2 : 1.5, ...(style === 'dashed' ? {dash: [6, 4], auto: false} : {})}));
   return {list: [{label: 'time'}, ...bands, ...curves], bands: plot.band ? [{series: [1, 2], fill: `${shade}55`}] : undefined};
 }
 
@@ -178,6 +179,7 @@ function paddedRange(chart, low, high) {
   for (let place = 0; place < times.length; place += stride) {
     if (times[place] < first || times[place] > last) continue;
     for (let curve = 1; curve < chart.data.length; curve += 1) {
+      if (chart.series[curve].dash) continue;  // a limit may be far off
       const value = chart.data[curve][place];
       if (value !== null && value !== undefined) values.push(value);
     }
@@ -187,7 +189,7 @@ function paddedRange(chart, low, high) {
   const [few, most] = [share(0.02), share(0.98)];
   const width = Math.max(most - few, Math.abs(most) * 1e-3);
   if (values.length > 20 && high - low > 20 * width) [low, high] = [Math.max(low, few - 0.5 * width), Math.min(high, most + 0.5 * width)];
-  const pad = Math.max((high - low) * 0.08, Math.abs(high) * 1e-3, 1e-6);
+  const pad = Math.max((high - low) * 0.08, Math.abs(high) * 1e-3, high === low ? 1 : 1e-6);
   return [low - pad, high + pad];
 }
 
@@ -396,13 +398,15 @@ function writeTabs(actuators) {
   replaceIfChanged(tabs, actuators.map((one) => one.label), () => actuators.map((one) => {
     const tab = element('button');
     tab.type = 'button';
-    tab.append(element('i', '', 'dot'), element('span', one.label));
+    tab.append(element('span', one.label), element('b'));
     tab.addEventListener('click', () => choose(one.label));
     return tab;
   }));
   actuators.forEach((one, place) => {
     tabs.children[place].setAttribute('aria-pressed', String(one.label === label));
-    tabs.children[place].firstChild.className = `dot ${one.verdict}`;
+    const value = tabs.children[place].lastChild, force = one.feedforward === null ? '' : ` ${one.feedforward.toFixed(1)} N`;
+    value.className = one.verdict;
+    setText(value, `${one.verdict}${force}`);
   });
   tabs.hidden = actuators.length < 2;
 }
@@ -442,6 +446,10 @@ async function send(path, document) {
 
 async function change(name, value, inputs) {
   const output = byId('change-answer');
+  if (name === 'scale' && value > 1 && !confirm(`Scale ${value}: more force than the friction, the rod may move by itself. Set it?`)) {
+    for (const input of inputs) input.value = input.dataset.shown;
+    return;
+  }
   output.className = 'waiting';
   output.textContent = 'sent, waiting for the answer of the node';
   const answers = await send('/change', {actuator: label, parameter: name, value});
@@ -610,7 +618,8 @@ async function showBag(wanted = label) {
     if (columns.time) clearRows();
     takeFrame(frame);
     writeMarks();
-    setText(byId('clock'), `${until.toFixed(1)} of ${about.duration.toFixed(1)} s`);
+    const read = about.loaded < about.duration ? `, read to ${about.loaded.toFixed(0)} s` : '';
+    setText(byId('clock'), `${frame.time.toFixed(1)} of ${about.duration.toFixed(1)} s${read}`);
     mode('bag', `RECORDING ${about.name}`);
   } catch (error) {
     lost();
@@ -623,22 +632,50 @@ async function showBag(wanted = label) {
   }
 }
 
-// A mark on the slider for each fault of the actuator, which goes there.
+const goTo = (time) => {
+  byId('time').value = Math.min(time + span / 2, about.duration);
+  showBag();
+};
+
+// The next fault after the middle of the window; after the last one the first.
+function nextFault() {
+  const starts = about.faults[label].map(([begin]) => begin), middle = Number(byId('time').value) - span / 2;
+  if (starts.length) goTo(starts.find((begin) => begin > middle + 0.06) ?? starts[0]);
+}
+
+// Above the slider: friction of the whole bag, a tick for each reversal, and a mark for each fault, which goes there.
 function writeMarks() {
-  const marks = byId('marks'), share = (time) => `${100 * Math.max(time, 0) / about.duration}%`;
-  replaceIfChanged(marks, label, () => about.faults[label].map(([begin, last, words]) => {
+  const share = (time) => `${100 * Math.max(time, 0) / about.duration}%`;
+  const faults = about.faults[label], {curve, reversals} = about.overview[label];
+  replaceIfChanged(byId('marks'), faults, () => faults.map(([begin, last, words]) => {
     const made = element('button');
     made.type = 'button';
     made.title = `${begin.toFixed(1)} s: ${words}`;
     made.setAttribute('aria-label', made.title);
     made.style.left = share(begin);
     made.style.width = share(last - begin);
-    made.addEventListener('click', () => {
-      byId('time').value = Math.min(begin + span / 2, about.duration);
-      showBag();
-    });
+    made.addEventListener('click', () => goTo(begin));
     return made;
   }));
+  byId('next-fault').disabled = !faults.length;
+  const x = (time) => (1000 * time / about.duration).toFixed(1), known = curve.filter((point) => point[1] !== null);
+  const [low, high] = [Math.min(...known.map((point) => point[1])), Math.max(...known.map((point) => point[2]))];
+  const y = (force) => (32 - 30 * (force - low) / (high - low || 1)).toFixed(1);
+  const path = curve.map(([time, least, most], place) => (
+    least === null ? '' : `${place && curve[place - 1][1] !== null ? 'L' : 'M'}${x(time)} ${y(least)}V${y(most)}`));
+  byId('friction-curve').setAttribute('d', path.join(''));
+  byId('reversals').setAttribute('d', reversals.map((time) => `M${x(time)} 35V40`).join(''));
+}
+
+// What has been read meanwhile.
+async function readOn() {
+  try {
+    about = await (await fetch(address('/describe'))).json();
+    showBag();
+  } catch (error) {
+    lost();
+  }
+  if (about.loaded < about.duration) setTimeout(readOn, READ_PERIOD);
 }
 
 function play() {
@@ -652,7 +689,7 @@ function play() {
     let place = Number(slider.value);
     playing = setInterval(() => {
       const moment = performance.now();
-      place += (moment - before) / 1000;
+      place += Number(byId('speed').value) * (moment - before) / 1000;
       before = moment;
       slider.value = place;
       showBag();
@@ -717,7 +754,9 @@ async function begin() {
     byId('time').value = Math.min(about.first + span, about.duration);
     byId('time').addEventListener('input', () => showBag());
     byId('play').addEventListener('click', play);
+    byId('next-fault').addEventListener('click', nextFault);
     showBag('');
+    if (about.loaded < about.duration) setTimeout(readOn, READ_PERIOD);
   }
 }
 
