@@ -211,17 +211,22 @@ def draw(path: Path, squares: Mapping[str, list[float]]) -> None:
     figure.savefig(path, dpi=150, metadata={'Software': None})
 
 
-def compared(folder: Path, work: Path, figure: Path | None = None) -> dict[str, dict[str, dict[str, float]]]:
-    """Errors of every estimator for every ordered pair of logs."""
-    logs = {}
+def seals_and_logs(folder: Path, work: Path) -> dict[str, tuple[Path, Log]]:
+    """Seal file that each log of a folder gives, and the log, by its name."""
+    found = {}
     for path in sorted(folder.glob('*.exp')):
         bag, seal = work / path.stem, work / f'{path.stem}.yaml'
         _run('import', 'log', path, '--rig', 'mbari', '--out', bag)
         _run('identify', path, '--rig', 'mbari', '--out', seal)
-        logs[path.stem] = read_log(bag), seal
+        found[path.stem] = seal, read_log(bag)
+    return found
+
+
+def compared(folder: Path, work: Path, figure: Path | None = None) -> dict[str, dict[str, dict[str, float]]]:
+    """Errors of every estimator for every ordered pair of logs."""
     table: dict[str, dict[str, dict[str, float]]] = {}
     squares: dict[str, list[float]] = {}
-    for (one, (learnt_on, seal)), (other, (log, _)) in itertools.permutations(logs.items(), 2):
+    for (one, (seal, learnt_on)), (other, (_, log)) in itertools.permutations(seals_and_logs(folder, work).items(), 2):
         ours, squares[f'{one} -> {other}'] = package(seal, log)
         table[f'{one} -> {other}'] = {
             'least squares, offset of 0.5 s': errors(log, fixed(learnt_on, log)),

@@ -405,6 +405,8 @@ def estimate_at(
         if measured * velocity <= 0.0 or hidden.speed > 0.0 or hidden.doubt > 0.0:
             moment = Apparent(elapsed, measured, velocity, seen.force_sum, friction.coulomb_friction)
             state.hidden = with_sample(hidden, moment, parameters.settings.slip_velocity)
+            if hidden.doubt > 0.0 and state.hidden.doubt == 0.0:  # what passed for ripple was a motion, which is over
+                state.motion = replace(state.motion, half_width=0.0, last_ripple=0.0, samples=0)
         is_short = abs(swing.way) <= LONGEST_SWING or (velocity > 0.0) != (swing.way > 0.0)
         if velocity != 0.0 and (is_short or swing.doubted > 0.0):
             state.swing = swing_on(swing, elapsed, velocity, seen.force_sum, estimate.friction_force)

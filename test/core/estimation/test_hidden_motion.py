@@ -91,6 +91,17 @@ def test_a_rod_that_vibrates_has_no_wrong_friction_with_status_0(amplitude, freq
     assert np.mean(wrong[round(2.0 * rate) :]) <= 0.005
 
 
+def test_a_vibration_that_is_over_is_no_ripple_of_the_slow_motion_after_it():
+    rate, speed, amplitude, frequency, mass = 1000.0, 3e-3, 5e-5, 300.0, 20.0  # [Hz], [m/s], [m], [Hz], [kg]
+    time = np.arange(0.0, 8.0, 1.0 / rate)
+    sine = amplitude * np.sin(2.0 * np.pi * frequency * time) * (time < 3.0)
+    velocity = np.gradient(speed * time + sine, time)
+    force = FRICTION * np.sign(velocity) - mass * (2.0 * np.pi * frequency) ** 2 * sine
+    found = estimates(speed * time + sine, force, rate, 1e-9)
+    assert uncertain(found[: round(3.0 * rate)], rate) == 1.0
+    assert uncertain(found, rate, 4.0) == 0.0
+
+
 @pytest.mark.parametrize('rate', [100.0, 1000.0])
 @pytest.mark.parametrize('count', [1e-6, 1e-5])  # [m]
 @pytest.mark.parametrize('push', [0.0, 0.5])  # [-] of the friction: a slow swing that the seals hold
