@@ -109,5 +109,5 @@ def run_charts(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.files import config_path
     from seal_friction_ros.offline.reports.seal_charts import write_seal_charts
 
-    numbers = write_seal_charts(config_path('seals', arguments.seal), arguments.out)
-    return cli.print_result(arguments, numbers, '')
+    summary = write_seal_charts(config_path('seals', arguments.seal), arguments.out)
+    return cli.print_result(arguments, summary.flat, '')

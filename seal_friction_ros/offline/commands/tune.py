@@ -100,4 +100,4 @@ def run_servo(arguments: argparse.Namespace) -> int:
     """Simulate and write the page."""
     from seal_friction_ros.offline.reports.servo_charts import write_servo_charts
 
-    return cli.print_result(arguments, write_servo_charts(arguments.out), '')
+    return cli.print_result(arguments, write_servo_charts(arguments.out).flat, '')

@@ -95,7 +95,8 @@ def _verdict(
     if changes:
         times = 'once' if changes == 1 else f'{changes} times'
         after = 'find out what was done then; see the dashed lines'
-        found.insert(0, Finding(LOOK, f'the friction has changed {times}', after))
+        changed = Finding(LOOK, f'the friction has changed {times}', after)
+        found = [*found, changed] if len(days) == 1 else [changed, *found]  # of one bag its own verdict decides
     return verdict_of(found)
 
 

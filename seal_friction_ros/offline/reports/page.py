@@ -75,6 +75,11 @@ class ReportSummary:
     figures: tuple[Path, ...]
     numbers: dict[str, Any]  # plain types for JSON; None for a missing number
 
+    @property
+    def flat(self) -> dict[str, Any]:
+        """All in one object for JSON."""
+        return {'page': self.page, 'figures': self.figures, **self.numbers}
+
 
 def parameter_rows(record: Any, prefix: str = '') -> list[tuple[Any, ...]]:
     """Name, value, unit and meaning of each described field of a record, for a `Table` with `PARAMETER_HEADS`."""

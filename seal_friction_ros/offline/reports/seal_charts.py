@@ -33,7 +33,7 @@ from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, number
-from seal_friction_ros.offline.reports.page import Table, head_of, write_page
+from seal_friction_ros.offline.reports.page import ReportSummary, Table, head_of, write_page
 from seal_friction_ros.offline.reports.thesis_data import (
     THESIS_SEAL,
     dynamic_readings,
@@ -46,20 +46,6 @@ STATE_PRESSURE = 500.0 * PSI  # [Pa] of Figures 22 and 23
 STATE_VELOCITY = 5.0 * INCH  # [m/s] at the ends of Figure 22
 PRESSURE_LABEL = 'pressure [bar, gauge]'
 _SINGLE: dict[str, Any] = {'marker': 'o', 'ls': '', 'ms': 6.5, 'color': style.BLACK}
-
-
-@dataclass(frozen=True)
-class ChartsSummary:
-    """Files of the charts, and their numbers."""
-
-    page: Path
-    figures: tuple[Path, ...]
-    seal: str
-    seal_count: int
-    pressures: tuple[float, ...]  # [Pa, gauge]
-    coulomb_friction: tuple[float, ...]  # [N] of all ``seal_count`` seals, at each of ``pressures``
-    measured: tuple[float, ...]
-    """[N] mean dynamic friction of the tests of the thesis at each of ``pressures``; empty for another seal"""
 
 
 DIRECTIONS = (('towards the pressure', -1, ':'), ('away from it', 1, '-.'))
@@ -102,8 +88,8 @@ def charted_seal(seal: Seal) -> ChartedSeal:
 
 
 @house_style()
-def write_seal_charts(seal: Path, out: Path) -> ChartsSummary:
-    """Write the charts of a seal file; see `write_page`.
+def write_seal_charts(seal: Path, out: Path) -> ReportSummary:
+    """Write the charts of a seal file; see `write_page`. The numbers are the friction of all seals at some pressures.
 
     Args:
         seal: Seal file.
@@ -139,7 +125,8 @@ def write_seal_charts(seal: Path, out: Path) -> ChartsSummary:
     )
     pressures, measured = _compared(shown)
     frictions = tuple(shown.friction(pressure).coulomb_friction for pressure in pressures)
-    return ChartsSummary(out, figures, shown.seal.name, len(shown.mounted), pressures, frictions, measured)
+    numbers = {'seal': shown.seal.name, 'seal_count': len(shown.mounted), 'pressures': pressures}
+    return ReportSummary(out, figures, numbers | {'coulomb_friction': frictions, 'measured': measured})
 
 
 def _verdict(shown: ChartedSeal) -> Verdict:

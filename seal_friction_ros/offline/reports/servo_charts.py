@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,6 +22,7 @@ from seal_friction_ros.offline.reports.figure_style import Plot, finished, house
 from seal_friction_ros.offline.reports.formatting import force_unit, length_text, length_unit, number
 from seal_friction_ros.offline.reports.page import (
     PARAMETER_HEADS,
+    ReportSummary,
     Table,
     head_of,
     parameter_rows,
@@ -42,19 +43,6 @@ class ServoTracking:
     reached: float  # [m] amplitude of the rod
     dwell: float  # [s] mean rest per reversal; the simulated rod rests at exactly 0 m/s
     dwell_share: float  # [-] of a period
-
-
-@dataclass(frozen=True)
-class ServoChartsSummary:
-    """Files of the charts, and their numbers."""
-
-    page: Path
-    figures: tuple[Path, ...]
-    amplitude: float  # [m] of the reference
-    frequency: float  # [Hz] of the reference
-    seals: int
-    with_friction: ServoTracking
-    without_friction: ServoTracking
 
 
 class FollowedWave(NamedTuple):
@@ -89,9 +77,7 @@ def follow_wave(parameters: ServoParameters, wave: Sine) -> FollowedWave:
 
 
 @house_style()
-def write_servo_charts(
-    out: Path, parameters: ServoParameters | None = None, wave: Sine | None = None
-) -> ServoChartsSummary:
+def write_servo_charts(out: Path, parameters: ServoParameters | None = None, wave: Sine | None = None) -> ReportSummary:
     """Write the charts of a servo; see `write_page`.
 
     Args:
@@ -121,9 +107,9 @@ def write_servo_charts(
         SETTLING_PERIODS=SETTLING_PERIODS,
         CHART_PERIODS=CHART_PERIODS,
     )
-    return ServoChartsSummary(
-        out, figures, wave.amplitude, wave.frequency, len(servo.seals), rubbing.tracking, free.tracking
-    )
+    numbers: dict[str, Any] = {'amplitude': wave.amplitude, 'frequency': wave.frequency, 'seals': len(servo.seals)}
+    numbers |= {'with_friction': rubbing.tracking, 'without_friction': free.tracking}
+    return ReportSummary(out, figures, numbers)
 
 
 def _verdict(rubbing: ServoTracking, free: ServoTracking) -> Verdict:

@@ -41,7 +41,6 @@ def write_tuning_page(tuning: SimulatorTuning | BagTuning, out: Path) -> tuple[P
         has_placeholder=tuning.task.has_placeholder,
         mass=None if law is None else law.mass,
         fitted=law is not None and law.mass_is_fitted,
-        bag=law is not None,
     )
     source = 'simulated servo, no measured data' if law is None else tuning.task.source
     head = head_of('tune', source, tuning.task.seals)

@@ -63,18 +63,15 @@ def of_identification(found: IdentificationNumbers) -> Verdict:
     return Verdict(level, '; '.join([text, *reasons]) + '.', after)
 
 
-def of_tuning(
-    summary: str, *, is_better: bool, has_placeholder: bool, mass: float | None, fitted: bool, bag: bool
-) -> Verdict:
+def of_tuning(summary: str, *, is_better: bool, has_placeholder: bool, mass: float | None, fitted: bool) -> Verdict:
     """Verdict on a tuned feed-forward.
 
     Args:
         summary: Result as a sentence.
         is_better: Whether it is better than none in every case.
         has_placeholder: Whether a seal is the placeholder.
-        mass: Moving mass [kg]; None for the simulated servo.
+        mass: Moving mass of a recorded axis [kg]; None for the simulated servo.
         fitted: Whether the mass was fitted.
-        bag: Whether it was tuned on a recorded axis.
     """
     if mass is not None and mass <= 0.0:
         given = 'fitted' if fitted else 'given'
@@ -89,7 +86,7 @@ def of_tuning(
     if has_placeholder:
         text = 'The seals are the placeholder of the default configuration, not those of your machine.'
         return Verdict(BAD, text, f'{NAME_SEALS}, then tune again.')
-    if bag:
+    if mass is not None:
         after = 'start with half of feedforward.scale on the machine: docs/tuning.md says how.'
         return Verdict(LOOK, f'{summary} A bag cannot show limit cycles.', after)
     return Verdict(

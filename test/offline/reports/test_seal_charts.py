@@ -84,10 +84,11 @@ def test_each_seal_file_of_the_project_makes_a_page(tmp_path, name):
     assert ('fig18_coefficient_of_friction' in figures) == (name != 'ms28775_114_prior_art')
     assert 'http' not in page.prose
     rows = page.table('pressure [bar]')
-    assert [row['mean of the tests [N]'] for row in rows] == [number(force) for force in summary.measured]
-    frictions = [number(force) for force in summary.coulomb_friction]
+    assert [row['mean of the tests [N]'] for row in rows] == [number(force) for force in summary.numbers['measured']]
+    frictions = [number(force) for force in summary.numbers['coulomb_friction']]
     assert [row['Coulomb friction, two seals [N]'] for row in rows] == frictions
-    assert (summary.seal, summary.seal_count, len(summary.measured)) == (name, 2, 11)
+    found = summary.numbers
+    assert (found['seal'], found['seal_count'], len(found['measured'])) == (name, 2, 11)
 
 
 @pytest.mark.renders
@@ -110,8 +111,8 @@ def test_another_seal_is_drawn_alone_without_the_data_of_the_thesis(tmp_path):
     path = seal_file(tmp_path, name='<i>mine</i> $x_{1}$', identified_pressure=[0.0, 1e6])
     summary = write_seal_charts(path, tmp_path / 'charts.html')
     page = checked_page(summary.page)
-    assert summary.seal_count == 1
-    assert summary.measured == ()
+    assert summary.numbers['seal_count'] == 1
+    assert summary.numbers['measured'] == ()
     assert not any('prior_art' in figure.stem for figure in summary.figures)
     assert page.texts['h1'] == ['Seal <i>mine</i> $x_{1}$']
     assert page.texts['p.note'][0].startswith('500 psi is outside the identified range')

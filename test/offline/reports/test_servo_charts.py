@@ -78,8 +78,8 @@ def test_the_page_stands_alone_and_gives_the_same_bytes_again(tmp_path):
     assert [row['rest per reversal [ms]'] for row in page.table('')] == [f'{1e3 * RUBBING.tracking.dwell:.1f}', '0.0']
     (stroke,) = (row for row in page.table('parameter') if row['parameter'] == 'cylinder.stroke')
     assert (stroke['value'], stroke['unit']) == ('0.05', 'm')
-    assert one.with_friction == RUBBING.tracking
-    assert one.without_friction == FREE.tracking
+    assert one.numbers['with_friction'] == RUBBING.tracking
+    assert one.numbers['without_friction'] == FREE.tracking
 
 
 def test_a_servo_without_seals_has_nothing_to_compare(tmp_path):

@@ -29,7 +29,7 @@ def test_an_identified_law_is_judged_on_readings_that_it_has_not_seen(changed, l
 
 @pytest.mark.parametrize('mass', [-0.415, 0.0])
 def test_a_moving_mass_that_no_machine_has_is_an_alarm(mass):
-    given = {'is_better': True, 'has_placeholder': False, 'fitted': True, 'bag': True}
+    given = {'is_better': True, 'has_placeholder': False, 'fitted': True}
     verdict = verdicts.of_tuning('better', mass=mass, **given)
     assert verdict.level == BAD
     assert f'{mass:.3g} kg' in verdict.text
