@@ -52,6 +52,7 @@ from faults import REQUIRED, TRIALS
 
 from seal_friction_ros.core.friction.seal_file import keys_of_law
 from seal_friction_ros.core.friction.temperature import TemperatureScale
+from seal_friction_ros.core.friction.term_covariance import TermCovariance
 
 DOCS = Path(__file__).parents[1] / 'docs'
 RECORDS = (
@@ -69,6 +70,7 @@ RECORDS = (
     Mounting,
     ForceSumCorrection,
     TemperatureScale,
+    TermCovariance,
     PressureAsymmetry,
     Uncertainty,
     Groove,

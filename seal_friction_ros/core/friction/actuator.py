@@ -25,6 +25,7 @@ from seal_friction_ros.core.friction.temperature import (
     scale_at,
     std_of_unknown,
 )
+from seal_friction_ros.core.friction.term_covariance import TermCovariance
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,7 @@ class Seal(CheckedParameters):
     presliding: Presliding | None = None  # None: rigid, or not known
     force_sum_correction: ForceSumCorrection | None = None  # of the machine that the seal was measured in
     temperature: TemperatureScale | None = None  # None: the friction is not known to depend on it
+    covariance: TermCovariance | None = None  # of the parameters of law and velocity terms; None: not known
 
     def __post_init__(self) -> None:
         super().__post_init__()

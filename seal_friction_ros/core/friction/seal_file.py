@@ -13,8 +13,9 @@ A seal file looks like this; every law and every field is in docs/seal_files.md:
     identified_pressure: [0.0, 6.9e+6]
 
 Optional are ``velocity_terms``, ``pressure_asymmetry``, ``presliding``, ``stiction_ratio``, ``friction_scale``,
-``identified_speed``, ``identified_directions``, ``mounting``, ``force_sum_correction``, ``temperature``, and
-``identification``: what ``seal_friction identify`` reports about its data. This module ignores the latter.
+``identified_speed``, ``identified_directions``, ``mounting``, ``force_sum_correction``, ``temperature``,
+``covariance``, and ``identification``: what ``seal_friction identify`` reports about its data. This module ignores the
+latter.
 """
 
 import dataclasses
@@ -42,11 +43,13 @@ from seal_friction_ros.core.friction.mounting import Mounting
 from seal_friction_ros.core.friction.presliding import Presliding
 from seal_friction_ros.core.friction.pressure_asymmetry import PressureAsymmetry
 from seal_friction_ros.core.friction.temperature import TemperatureScale
+from seal_friction_ros.core.friction.term_covariance import TermCovariance
 
 _COMMON = {
     'name', 'source', 'geometry', 'coulomb_law', 'stiction', 'stiction_ratio', 'velocity_terms', 'uncertainty',
     'identified_pressure', 'identified_speed', 'identified_directions', 'identification', 'mounting',
     'force_sum_correction', 'friction_scale', 'presliding', 'temperature', 'pressure_asymmetry',
+    'covariance',
 }  # fmt: skip
 _PARTS: dict[type, str] = {
     SealGeometry: 'geometry',
@@ -66,6 +69,7 @@ _OPTIONAL: dict[str, type] = {
     'presliding': Presliding,
     'force_sum_correction': ForceSumCorrection,
     'temperature': TemperatureScale,
+    'covariance': TermCovariance,
 }
 """Part of a seal that a file may have -> its record"""
 
@@ -89,6 +93,7 @@ def parse_seal(document: Any) -> Seal:
         key: from_mapping(record, document[key], f'{where}: {key}') if key in document else None
         for key, record in _OPTIONAL.items()
     }
+    _check_terms(optional['covariance'], law_type, where)
     about = document.get('identification', {})
     if not isinstance(about, Mapping) or not _can_be_recorded(about):
         raise ValueError(f'{where}: identification is not a mapping of texts, finite numbers, and lists of them')
@@ -110,6 +115,14 @@ def parse_seal(document: Any) -> Seal:
         **optional,
     }
     return from_mapping(Seal, numbers, where, **made)
+
+
+def _check_terms(covariance: TermCovariance | None, law_type: type[FrictionLaw], where: str) -> None:
+    of_part = law_type.FITTED_PART[1] if law_type.FITTED_PART else law_type
+    known = {**meanings(law_type), **meanings(of_part), **meanings(VelocityTerms)}
+    wrong = [term for term in (covariance.terms if covariance else ()) if term not in known]
+    if wrong:
+        raise ValueError(f'{where}: covariance: {wrong[0]} is no parameter of {law_type.NAME}: {", ".join(known)}')
 
 
 def _ends(document: Mapping[str, Any], key: str, what: str, where: str) -> Any:

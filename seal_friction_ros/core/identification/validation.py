@@ -125,6 +125,12 @@ def jackknife_errors(estimates: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt((groups - 1) / groups * np.sum((estimates - estimates.mean(axis=0)) ** 2, axis=0)))
 
 
+def jackknife_covariance(estimates: FloatArray) -> FloatArray:
+    """Covariance by the jackknife, shape (parameters, parameters); arguments and source as of `jackknife_errors`."""
+    groups, off = len(estimates), estimates - estimates.mean(axis=0)
+    return np.asarray((groups - 1) / groups * off.T @ off)
+
+
 class PredictionUncertainty(NamedTuple):
     """Standard deviation of a new reading of all seals: std^2 = (relative f)^2 + absolute^2."""
 

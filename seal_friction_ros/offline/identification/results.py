@@ -24,7 +24,11 @@ from seal_friction_ros.core.identification.seal_kinds import AreaErrors, ToldApa
 from seal_friction_ros.core.identification.selection import ChosenAnew, LawScore, NotScored, is_beaten, scored
 from seal_friction_ros.core.identification.signal_preparation import LEVEL_GAP, LEVEL_GAP_MIN
 from seal_friction_ros.core.identification.temperature import TemperatureFit
-from seal_friction_ros.core.identification.validation import CrossValidation, PredictionUncertainty
+from seal_friction_ros.core.identification.validation import (
+    CrossValidation,
+    PredictionUncertainty,
+    jackknife_covariance,
+)
 from seal_friction_ros.offline.identification.load_numbers import load_numbers
 from seal_friction_ros.offline.identification.presliding import (
     IdentifiedPresliding,
@@ -206,10 +210,23 @@ def seal_document(
     warmth = data.temperature
     if warmth is not None and not warmth.why_not:
         document['temperature'] = rounded_numbers(asdict(warmth.scale))
+    document['covariance'] = rounded_numbers(_covariance(selection, number))
     if presliding is not None:
         document['presliding'] = rounded_numbers(presliding_part(presliding))
     parse_seal(document)
     return document
+
+
+def _covariance(selection: LawSelection, number: int) -> dict[str, Any]:
+    """Covariance of the parameters of one seal of a kind, by fits without each group."""
+    law, values, names = selection.law, selection.fit.values, [p.name for p in selection.law.parameters]
+    terms = list(dict.fromkeys(name.rpartition('.')[2] for name in names))  # without the name of a kind
+    fits = [dict(zip(names, row, strict=True)) for row in selection.validation.parameters.tolist()]
+    of_one = [law.of_one_seal({**values, **fit})[number] for fit in fits]
+    covariance = jackknife_covariance(np.array([[each[term] for term in terms] for each in of_one]))
+    std = np.sqrt(np.diag(covariance))
+    correlation = np.clip(covariance / np.maximum(np.outer(std, std), 1e-300), -1.0, 1.0)
+    return {'terms': terms, 'std': std, 'correlation': correlation[np.triu_indices(len(terms), 1)]}
 
 
 def _identified_pressure(data: IdentificationData, number: int) -> list[float]:

@@ -44,6 +44,14 @@ def test_the_node_says_what_was_fitted(law, run_of):
     assert both[0] / both[1] == pytest.approx((1.0 + asymmetry) / (1.0 - asymmetry))
 
 
+def test_the_seal_file_has_the_covariance_of_the_parameters(run_of):
+    run = run_of(str(THESIS), *THESIS_RIG, '--law', 'constant_coulomb')
+    covariance = parse_seal(run.document).covariance
+    errors = run.figures['standard_errors']
+    assert covariance.terms == tuple(errors)
+    assert covariance.std == pytest.approx(list(errors.values()))
+
+
 def test_beyond_the_pressures_that_were_measured_the_node_says_so(run_of):
     run = run_of(str(THESIS), *THESIS_RIG)
     assert estimates_of(run, 8e6, 0.01).status == Status.OUTSIDE_IDENTIFIED_RANGE
