@@ -33,8 +33,10 @@ def draw_monitor(path: Path) -> None:
         log = folder / 'log'
         with (
             node_process('servo_simulator', domain, {**SEALS, **MOTION}, log, parameter_file=simulator),
-            node_process('friction_estimator', domain, {**SEALS, 'adaptation.mode': 'observe'}, log),
-            monitor(domain) as watching,
+            node_process(
+                'friction_estimator', domain, {**SEALS, 'adaptation.mode': 'observe', 'feedforward.scale': 0.9}, log
+            ),
+            monitor(domain, '--allow-changes') as watching,
             browser(folder) as page,
         ):
             end = time.monotonic() + PATIENCE

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.estimation.findings import SMALL_CHANGE, Finding, Verdict, verdict_of
+from seal_friction_ros.core.estimation.findings import GOOD, SMALL_CHANGE, Finding, Verdict, verdict_of
 from seal_friction_ros.core.estimation.strokes import PressureLevel
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
@@ -102,7 +102,9 @@ def _compare_runs(a: Path, b: Path, out: Path, namespace: str, mapping: MappingF
     ]
     change = verdicts.of_runs(known, names)
     between = Finding(change.level, change.text.rstrip('.'), change.next.rstrip('.'))
-    verdict = verdict_of([between, *runs[0].findings, *runs[1].findings])
+    own = [*runs[0].findings, *runs[1].findings]
+    is_small = all(abs(size) <= SMALL_CHANGE for _, size, _ in known)  # then what is wrong with a run decides
+    verdict = verdict_of([*(one for one in own if is_small and one.level != GOOD), between, *own])
     found = {'sliding': changes, 'breakaway': starts}
     return _write(out, f'compare {a} {b}', names, facts, plots, known, found, verdict)
 
