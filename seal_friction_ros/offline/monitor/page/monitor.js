@@ -335,8 +335,10 @@ function writeWords(frame) {
   if (about.mode === 'live' && moment - lastWords < WORDS_PERIOD) return;
   lastWords = moment;
   setText(byId('state'), now.state);
-  setText(byId('friction'), `${number(now.coulomb)} ± ${number(now.band, 'N', 2)}`);
-  setText(byId('friction-more'), `acts now ${number(now.friction, 'N')}, measured ${number(now.measured, 'N')}`);
+  const band = ` ± ${number(now.band, 'N', 2)}`, slides = /^sliding/.test(now.state); // at rest that of what acts
+  setText(byId('friction'), slides ? number(now.coulomb) + band : number(now.coulomb, 'N'));
+  const acts = slides ? number(now.friction, 'N') : number(now.friction) + band;
+  setText(byId('friction-more'), `acts now ${acts}, measured ${number(now.measured, 'N')}`);
   setText(byId('feedforward'), now.feedforward === null ? 'none' : number(now.feedforward, 'N'));
   const {scale, force_limit: limit} = now.settings;
   setText(byId('feedforward-more'), scale === 0 ? 'OFF: scale is 0' : scale === null ? '' : `scale ${number(scale)}, at most ${number(limit, 'N')}`);
