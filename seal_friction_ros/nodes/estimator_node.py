@@ -297,7 +297,7 @@ class EstimatorNode(ManagedNode):
             self._on_malformed(name, error)
             self._look_after_timers(began)
             return
-        received, before = time.monotonic_ns() + self._receipt_offset, self._state
+        received, before = self.now(), self._state
         sent = received - lateness if received > lateness else 0
         self._sent.clear()
         self._state = receive(self._machine, before, plan, message, received, self._send, sent)
