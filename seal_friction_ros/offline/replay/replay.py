@@ -33,6 +33,7 @@ from seal_friction_ros.offline.bags.actuator_bag import (
     find_topics,
     source_of,
 )
+from seal_friction_ros.offline.bags.bag import STATE_PERIOD
 from seal_friction_ros.offline.replay.answer_comparison import AnswerStream, ReplayResult, replay_result
 from seal_friction_ros.offline.work.progress import counted, progress
 
@@ -119,7 +120,7 @@ class Replay:
             if due <= message.log_time > newest:  # of messages of one time none is before a state and another after it
                 if due != NEVER:
                     yield from self._state_at(message.log_time)
-                due = message.log_time + round(rosbag.STATE_PERIOD * 1e9)
+                due = message.log_time + round(STATE_PERIOD * 1e9)
             newest = message.log_time
             used = message if self._tells_sending else message._replace(publish_time=message.log_time)
             if message.topic == self._configuration:
