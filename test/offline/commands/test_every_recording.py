@@ -148,8 +148,10 @@ def test_the_monitor_shows_every_actuator(command, kind):
         assert process.stdout is not None
         url = urlsplit(json.loads(process.stdout.readline())['url'])
         with closing(HTTPConnection(url.netloc, timeout=60.0)) as connection:
-            connection.request('GET', f'/view?since=4&until=4.3&{url.query}')
-            found = json.loads(connection.getresponse().read())
+            found = {'time': 0.0}
+            while found['time'] < 4.3:  # the bag is being read
+                connection.request('GET', f'/view?since=4&until=4.3&{url.query}')
+                found = json.loads(connection.getresponse().read())
         process.terminate()
     labels = [actuator['label'] for actuator in found['actuators']]
     nodes = ['/friction_estimator'] if kind == 'own' else [f'{name} (/machine_estimator)' for name in NAMES]
