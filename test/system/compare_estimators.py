@@ -162,7 +162,8 @@ def package(seal: Path, log: Log) -> tuple[dict[str, float], list[float]]:
         known = state.adaptation.filter
         if known.stamp == state.adaptation.stamp:
             squares.append((known.outliers.last / known.innovation_std) ** 2)
-        values.append((*known.terms[:4], known.terms.offset + known.terms.remainder))
+        scale, coulomb, viscous, asymmetry, offset, _, remainder, misfit = known.terms
+        values.append((scale, coulomb + misfit, viscous, asymmetry, offset + remainder))
         seen.append((estimate.status, estimate.residual, estimate.coulomb_friction_std))
     status, residual, std = np.array(seen)[log.is_even].T
     good = status == 0

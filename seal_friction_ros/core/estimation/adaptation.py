@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from seal_friction_ros.core.estimation.friction_filter import (
-    MISFIT,
+    COULOMB_PRIOR,
     NOT_BEGUN,
     PROVEN,
     SCALE_PRIOR,
@@ -51,7 +51,7 @@ LASTING = 2.5  # [-] mean of it over `SHORT_TIME`
 SHORT_TIME = 0.1  # [s]
 STRIBECK = 0.2  # [-] of the friction: standard deviation of what it is more when slow,
 STRIBECK_SPEED = 0.01  # [m/s] as from this speed
-NEW_RUN = math.hypot(SCALE_PRIOR, MISFIT)  # [-] of the friction: standard deviation of another day
+NEW_RUN = math.hypot(SCALE_PRIOR, COULOMB_PRIOR)  # [-] of the friction: standard deviation of another day
 REST = 0.1  # [s] after a motion in which the force sum may be that of the motion still
 LEAP_AT_REST = 0.3  # [-] sudden change of the force sum at rest over the friction, from which on it may be a load
 AT_ONCE = 2.0  # [-] on the noise of the force sum at rest, which nothing averages
@@ -411,12 +411,12 @@ def friction_of_sliding(
     lowest, highest = settings.scale_min, settings.scale_max
     direction, speed = (1.0, velocity) if velocity > 0.0 else (-1.0, -velocity)
     slope = terms.scale + direction * terms.asymmetry
-    found = slope * law + terms.misfit + terms.viscous * speed
+    found = slope * law + terms.coulomb + terms.misfit + terms.viscous * speed
     found = found if found > 0.0 else 0.0
     sliding = found if lowest * law <= found <= highest * law else between(lowest * law, found, highest * law)
     std = _std_of_sliding(known, speed, law, file_std)
     if uses and is_proven:
-        at_no_speed = between(lowest * coulomb, slope * coulomb + terms.misfit, highest * coulomb)
+        at_no_speed = between(lowest * coulomb, slope * coulomb + terms.coulomb + terms.misfit, highest * coulomb)
         scale = sliding / law if law > 0.0 else 1.0
         adapted = ActuatorFriction(
             at_no_speed, std, stiction * scale, is_in_range, sliding - at_no_speed, asymmetry * scale

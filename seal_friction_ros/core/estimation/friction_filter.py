@@ -2,29 +2,30 @@ r"""One Bayesian filter: what the friction is on this machine today, and how wel
 
 While the rod slides, the force sum less inertia is a reading of the friction and of what is not friction:
 
-.. math:: y = \Sigma F - m a = d\,(s f + c) + k v + a f + b + n + e
+.. math:: y = \Sigma F - m a = d\,(s f + c + u) + k v + a f + b + n + e
 
 with f the friction of the law of the seal files at the pressure and speed in use, d = +-1 the direction, v the
 velocity, and the state of the filter:
 
 ====  =============================================================================================
 s     scale of the law
-c     misfit: friction that the law misses at the present pressure [N]
+c     share of Coulomb friction that does not follow the law [N]
 k     viscous friction that the law does not have [N s/m]
 a     asymmetry: part of the friction that has another size in the two directions
 b     offset of the force sum where the rod is now: load, area or sensor zero that nobody took off [N]
 g     gradient of the offset over the way: load over position, as of a boom or a gas spring [N/m]
 n     remainder: what none of these explains and what passes within `REMAINDER_TIME` [N]
+u     misfit: friction that the law misses at the present pressure, beside c [N]
 ====  =============================================================================================
 
-The offset goes on with the way x of the rod, :math:`b_{i+1} = b_i + g\,\Delta x`; n and c are first-order Gauss-Markov
-processes, n over time and c over the relative change of f; the others are random walks and e is white. Friction is all
+The offset goes on with the way x of the rod, :math:`b_{i+1} = b_i + g\,\Delta x`; n and u are first-order Gauss-Markov
+processes, n over time and u over the relative change of f; the others are random walks and e is white. Friction is all
 but b, g and n, and its variance is that of the posterior: what cannot be told apart, as asymmetry from offset in one
 pressure, stays in the band, and so does a gradient beyond the longest stroke that the rod came back from. Terms that a
 motion does not excite keep their prior.
 
 The misfit keeps the scale the mean over all pressures: no law is right at each, and a law of one kind of seals for two
-misses some by a tenth. Without c the scale would be that of the pressure seen last.
+misses some by a tenth. Without u the scale would be that of the pressure seen last.
 
 The remainder makes the filter what it is: a friction that wavers over a stroke would else drag offset and scale along
 from one side of their band to the other. Samples that are too far away count less, as with noise of heavy tails; if
@@ -43,20 +44,21 @@ from seal_friction_ros.core.foundation.limits import between
 from seal_friction_ros.core.messages.records import NEVER
 
 # Prior: one standard deviation. A share is one of the friction by the law at the first sample.
-SCALE_PRIOR = 0.42  # [-] of another day, beside the deviation of the seal file
+SCALE_PRIOR = 0.3  # [-] of another day, beside the deviation of the seal file
+COULOMB_PRIOR = 0.3  # [-] share
 VISCOUS_PRIOR = 2.0  # [s/m] share per speed
 ASYMMETRY_PRIOR = 0.08  # [-]
 OFFSET_PRIOR = 10.0  # [-] share
 GRADIENT_PRIOR = 30.0  # [1/m] share over the way
 # Random walks: one standard deviation after one second.
-WALK = 0.012  # [-] of scale, viscous friction and asymmetry, each a share of its prior
+WALK = 0.012  # [-] of scale, Coulomb share, viscous friction and asymmetry, each a share of its prior
 OFFSET_WALK = 0.002  # [-] share
 # The gradient walks with the way: share over the longest stroke, after such a stroke.
 GRADIENT_WALK = 1.0  # [-]
 CURVED = 0.2  # [-] share: root mean square of an unexplained drift from which on the load may be curved over the way
 SHORTEST_STROKE = 1e-4  # [m]
-MISFIT = 0.06  # [-] share: standard deviation of c
-MISFIT_RANGE = 0.5  # [-] relative change of the friction of the law over which c passes
+MISFIT = 0.06  # [-] share: standard deviation of u
+MISFIT_RANGE = 0.5  # [-] relative change of the friction of the law over which u passes
 REMAINDER_TIME = 0.4  # [s] time constant of n
 REMAINDER = 0.05  # [-] share: standard deviation of n
 LEAST_NOISE = 0.1  # [-] share: standard deviation of e at first and at least, since readings in a row miss alike
@@ -77,12 +79,13 @@ class Terms(NamedTuple):
     """The state of the filter, or a row of its covariance."""
 
     scale: float  # s
-    misfit: float  # c
+    coulomb: float  # c
     viscous: float  # k
     asymmetry: float  # a
     offset: float  # b
     gradient: float  # g
     remainder: float  # n
+    misfit: float  # u
 
 
 class Covariance(NamedTuple):
@@ -95,27 +98,35 @@ class Covariance(NamedTuple):
     sb: float
     sg: float
     sn: float
+    su: float
     cc: float
     ck: float
     ca: float
     cb: float
     cg: float
     cn: float
+    cu: float
     kk: float
     ka: float
     kb: float
     kg: float
     kn: float
+    ku: float
     aa: float
     ab: float
     ag: float
     an: float
+    au: float
     bb: float
     bg: float
     bn: float
+    bu: float
     gg: float
     gn: float
+    gu: float
     nn: float
+    nu: float
+    uu: float
 
 
 class Unexplained(NamedTuple):
@@ -155,8 +166,8 @@ class FrictionFilter(NamedTuple):
     outliers: Outliers
 
 
-NO_TERMS = Terms(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-NO_COVARIANCE = Covariance(*[0.0] * 28)
+NO_TERMS = Terms(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_COVARIANCE = Covariance(*[0.0] * 36)
 NOT_BEGUN = FrictionFilter(
     stamp=NEVER,
     direction=0,
@@ -166,7 +177,7 @@ NOT_BEGUN = FrictionFilter(
     friction=0.0,
     friction_std=0.0,
     innovation_std=0.0,
-    terms=Terms(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    terms=Terms(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     covariance=NO_COVARIANCE,
     unexplained=Unexplained(),
     outliers=Outliers(0, 0.0, 0.0, NO_TERMS, False),
@@ -189,7 +200,7 @@ class Reading(NamedTuple):
 @compilable
 def friction_magnitude(terms: Terms, direction: float, speed: float, friction: float) -> float:
     """Friction of a rod that slides [N], never negative; at a ``direction`` of 0 the mean of both."""
-    magnitude = terms.scale * friction + terms.misfit + terms.viscous * speed
+    magnitude = terms.scale * friction + terms.coulomb + terms.misfit + terms.viscous * speed
     magnitude += direction * terms.asymmetry * friction
     return magnitude if magnitude > 0.0 else 0.0
 
@@ -197,9 +208,9 @@ def friction_magnitude(terms: Terms, direction: float, speed: float, friction: f
 @compilable
 def expected(terms: Terms, reading: Reading) -> float:
     """Force sum that these terms let a reading expect [N]."""
-    s, c, k, a, b, _, n = terms
+    s, c, k, a, b, _, n, u = terms
     direction, law = reading.direction, reading.friction
-    return direction * (s * law + c) + k * reading.velocity + a * law + b + n
+    return direction * (s * law + c + u) + k * reading.velocity + a * law + b + n
 
 
 @compilable
@@ -208,17 +219,19 @@ def _gains(covariance: Covariance, reading: Reading) -> Terms:
     c, k, a = float(reading.direction), reading.velocity, reading.friction
     s = c * a
     (
-        ss, sc, sk, sa, sb, sg, sn, cc, ck, ca, cb, cg, cn, kk, ka, kb, kg, kn,
-        aa, ab, ag, an, bb, bg, bn, _, gn, nn,
+        ss, sc, sk, sa, sb, sg, sn, su, cc, ck, ca, cb, cg, cn, cu,
+        kk, ka, kb, kg, kn, ku, aa, ab, ag, an, au,
+        bb, bg, bn, bu, _, gn, gu, nn, nu, uu,
     ) = covariance  # fmt: skip
     return Terms(
-        s * ss + c * sc + k * sk + a * sa + sb + sn,
-        s * sc + c * cc + k * ck + a * ca + cb + cn,
-        s * sk + c * ck + k * kk + a * ka + kb + kn,
-        s * sa + c * ca + k * ka + a * aa + ab + an,
-        s * sb + c * cb + k * kb + a * ab + bb + bn,
-        s * sg + c * cg + k * kg + a * ag + bg + gn,
-        s * sn + c * cn + k * kn + a * an + bn + nn,
+        s * ss + c * sc + k * sk + a * sa + sb + sn + c * su,
+        s * sc + c * cc + k * ck + a * ca + cb + cn + c * cu,
+        s * sk + c * ck + k * kk + a * ka + kb + kn + c * ku,
+        s * sa + c * ca + k * ka + a * aa + ab + an + c * au,
+        s * sb + c * cb + k * kb + a * ab + bb + bn + c * bu,
+        s * sg + c * cg + k * kg + a * ag + bg + gn + c * gu,
+        s * sn + c * cn + k * kn + a * an + bn + nn + c * nu,
+        s * su + c * cu + k * ku + a * au + bu + nu + c * uu,
     )
 
 
@@ -228,14 +241,19 @@ def begun(reading: Reading) -> FrictionFilter:
     force = reading.friction
     by_file = reading.friction_std / force
     scale = math.sqrt(SCALE_PRIOR * SCALE_PRIOR + by_file * by_file)  # hypot differs by a bit in compiled code
-    misfit, viscous, offset = MISFIT * force, VISCOUS_PRIOR * force, OFFSET_PRIOR * force
-    gradient, remainder = GRADIENT_PRIOR * force, REMAINDER * force
+    coulomb, viscous, offset = COULOMB_PRIOR * force, VISCOUS_PRIOR * force, OFFSET_PRIOR * force
+    gradient, remainder, misfit = GRADIENT_PRIOR * force, REMAINDER * force, MISFIT * force
     diagonal = replace(
-        NO_COVARIANCE, ss=scale * scale, cc=misfit * misfit, kk=viscous * viscous,
+        NO_COVARIANCE, ss=scale * scale, cc=coulomb * coulomb, kk=viscous * viscous,
         aa=ASYMMETRY_PRIOR * ASYMMETRY_PRIOR, bb=offset * offset, gg=gradient * gradient, nn=remainder * remainder,
+        uu=misfit * misfit,
     )  # fmt: skip
     return replace(
-        NOT_BEGUN, stamp=reading.stamp, covariance=diagonal, unexplained=Unexplained(LEAST_NOISE, force, 0.0, 0.0, 0.0)
+        NOT_BEGUN,
+        stamp=reading.stamp,
+        friction=force,
+        covariance=diagonal,
+        unexplained=Unexplained(LEAST_NOISE, force, 0.0, 0.0, 0.0),
     )
 
 
@@ -243,34 +261,36 @@ def begun(reading: Reading) -> FrictionFilter:
 def _predicted(
     known: FrictionFilter, reading: Reading, fits: float, elapsed: float, moved: float, longest: float
 ) -> Covariance:
-    """Covariance before the next reading: the offset takes its gradient along, c and n fade, the others walk.
+    """Covariance before the next reading: the offset takes its gradient along, n and u fade, the others walk.
 
     Args:
         known: Before the reading.
         reading: With the way to it.
-        fits: Share of c that is left at its pressure.
+        fits: Share of u that is left at its pressure.
         elapsed: [s] since the reading before: offset and n change at rest, too.
         moved: [s] of it in motion.
         longest: Stroke [m].
     """
     way, law, drift = reading.way, reading.friction, CURVED * reading.friction
     kept = REMAINDER_TIME / (REMAINDER_TIME + elapsed)
-    misfit, viscous, offset = MISFIT * law, VISCOUS_PRIOR * law, OFFSET_WALK * law
+    coulomb, viscous, offset = COULOMB_PRIOR * law, VISCOUS_PRIOR * law, OFFSET_WALK * law
     walk, gradient, remainder = moved * WALK * WALK, GRADIENT_WALK * law / longest, REMAINDER * law
     curved = abs(way) / longest if known.unexplained.drift_square > drift * drift else 0.0
+    misfit = MISFIT * law
     (
-        ss, sc, sk, sa, sb, sg, sn, cc, ck, ca, cb, cg, cn, kk, ka, kb, kg, kn,
-        aa, ab, ag, an, bb, bg, bn, gg, gn, nn,
+        ss, sc, sk, sa, sb, sg, sn, su, cc, ck, ca, cb, cg, cn, cu,
+        kk, ka, kb, kg, kn, ku, aa, ab, ag, an, au,
+        bb, bg, bn, bu, gg, gn, gu, nn, nu, uu,
     ) = known.covariance  # fmt: skip
     return Covariance(
-        ss + walk * SCALE_PRIOR * SCALE_PRIOR, fits * sc, sk, sa, sb + way * sg, sg, kept * sn,
-        fits * fits * cc + (1.0 - fits * fits) * misfit * misfit,
-        fits * ck, fits * ca, fits * (cb + way * cg), fits * cg, kept * fits * cn,
-        kk + walk * viscous * viscous, ka, kb + way * kg, kg, kept * kn,
-        aa + walk * ASYMMETRY_PRIOR * ASYMMETRY_PRIOR, ab + way * ag, ag, kept * an,
+        ss + walk * SCALE_PRIOR * SCALE_PRIOR, sc, sk, sa, sb + way * sg, sg, kept * sn, fits * su,
+        cc + walk * coulomb * coulomb, ck, ca, cb + way * cg, cg, kept * cn, fits * cu,
+        kk + walk * viscous * viscous, ka, kb + way * kg, kg, kept * kn, fits * ku,
+        aa + walk * ASYMMETRY_PRIOR * ASYMMETRY_PRIOR, ab + way * ag, ag, kept * an, fits * au,
         bb + way * (2.0 * bg + way * gg) + elapsed * offset * offset, bg + way * gg, kept * (bn + way * gn),
-        gg + curved * gradient * gradient, kept * gn,
-        kept * kept * nn + (1.0 - kept * kept) * remainder * remainder,
+        fits * (bu + way * gu), gg + curved * gradient * gradient, kept * gn, fits * gu,
+        kept * kept * nn + (1.0 - kept * kept) * remainder * remainder, kept * fits * nu,
+        fits * fits * uu + (1.0 - fits * fits) * misfit * misfit,
     )  # fmt: skip
 
 
@@ -288,8 +308,8 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
         stroke += known.stroke
     elif known.stroke > longest:
         longest = known.stroke
-    s, c, k, a, b, g, n = known.terms
-    terms = Terms(s, fits * c, k, a, b + reading.way * g, g, kept * n)
+    s, c, k, a, b, g, n, u = known.terms
+    terms = Terms(s, c, k, a, b + reading.way * g, g, kept * n, fits * u)
     covariance = _predicted(known, reading, fits, elapsed, moved, stroke if stroke > longest else longest)
     innovation = reading.force - expected(terms, reading)
     usual = known.unexplained.usual
@@ -349,27 +369,29 @@ def _corrected(
     distance = abs(innovation) / math.sqrt(variance)
     if distance > OUTLIER:
         variance = spread + noise * noise * (distance / OUTLIER) * (distance / OUTLIER)
-    s, c, k, a, b, g, n = gains
-    sv, cv, kv, av, bv, gv, nv = (
-        s / variance, c / variance, k / variance, a / variance, b / variance, g / variance, n / variance,
+    s, c, k, a, b, g, n, u = gains
+    sv, cv, kv, av, bv, gv, nv, uv = (
+        s / variance, c / variance, k / variance, a / variance, b / variance, g / variance, n / variance, u / variance,
     )  # fmt: skip
     (
-        ss, sc, sk, sa, sb, sg, sn, cc, ck, ca, cb, cg, cn, kk, ka, kb, kg, kn,
-        aa, ab, ag, an, bb, bg, bn, gg, gn, nn,
+        ss, sc, sk, sa, sb, sg, sn, su, cc, ck, ca, cb, cg, cn, cu,
+        kk, ka, kb, kg, kn, ku, aa, ab, ag, an, au,
+        bb, bg, bn, bu, gg, gn, gu, nn, nu, uu,
     ) = covariance  # fmt: skip
-    scale, misfit, viscous, asymmetry, offset, gradient, remainder = terms
+    scale, coulomb, viscous, asymmetry, offset, gradient, remainder, misfit = terms
     terms = Terms(
-        scale + sv * innovation, misfit + cv * innovation, viscous + kv * innovation, asymmetry + av * innovation,
-        offset + bv * innovation, gradient + gv * innovation, remainder + nv * innovation,
+        scale + sv * innovation, coulomb + cv * innovation, viscous + kv * innovation, asymmetry + av * innovation,
+        offset + bv * innovation, gradient + gv * innovation, remainder + nv * innovation, misfit + uv * innovation,
     )  # fmt: skip
     return terms, Covariance(
-        ss - sv * s, sc - sv * c, sk - sv * k, sa - sv * a, sb - sv * b, sg - sv * g, sn - sv * n,
-        cc - cv * c, ck - cv * k, ca - cv * a, cb - cv * b, cg - cv * g, cn - cv * n,
-        kk - kv * k, ka - kv * a, kb - kv * b, kg - kv * g, kn - kv * n,
-        aa - av * a, ab - av * b, ag - av * g, an - av * n,
-        bb - bv * b, bg - bv * g, bn - bv * n,
-        gg - gv * g, gn - gv * n,
-        nn - nv * n,
+        ss - sv * s, sc - sv * c, sk - sv * k, sa - sv * a, sb - sv * b, sg - sv * g, sn - sv * n, su - sv * u,
+        cc - cv * c, ck - cv * k, ca - cv * a, cb - cv * b, cg - cv * g, cn - cv * n, cu - cv * u,
+        kk - kv * k, ka - kv * a, kb - kv * b, kg - kv * g, kn - kv * n, ku - kv * u,
+        aa - av * a, ab - av * b, ag - av * g, an - av * n, au - av * u,
+        bb - bv * b, bg - bv * g, bn - bv * n, bu - bv * u,
+        gg - gv * g, gn - gv * n, gu - gv * u,
+        nn - nv * n, nu - nv * u,
+        uu - uv * u,
     )  # fmt: skip
 
 
@@ -442,7 +464,8 @@ def friction_std(covariance: Covariance, drift_square: float, reading: Reading) 
     """
     c, k, a = float(reading.direction), reading.velocity, reading.friction
     s, p, least = c * a, covariance, REMAINDER * a * REMAINDER * a
-    variance = s * s * p.ss + c * c * p.cc + k * k * p.kk + a * a * p.aa
-    variance += 2.0 * (s * (c * p.sc + k * p.sk + a * p.sa) + c * (k * p.ck + a * p.ca) + k * a * p.ka)
+    variance = s * s * p.ss + c * c * (p.cc + 2.0 * p.cu + p.uu) + k * k * p.kk + a * a * p.aa
+    variance += 2.0 * (s * (c * (p.sc + p.su) + k * p.sk + a * p.sa) + c * (k * (p.ck + p.ku) + a * (p.ca + p.au)))
+    variance += 2.0 * k * a * p.ka
     variance += drift_square if drift_square > least else least
     return math.sqrt(variance) if variance > 0.0 else 0.0

@@ -245,7 +245,7 @@ def test_what_is_not_known_is_said_to_be_unknown():
 def test_what_is_known_is_told_in_its_unit():
     known: FrictionFilter = NOT_BEGUN._replace(
         stamp=3_000 * MS,
-        terms=Terms(1.0, 8.0, 40.0, 0.0, -5.0, 2.0, 0.7),
+        terms=Terms(1.0, 8.0, 40.0, 0.0, -5.0, 2.0, 0.7, 0.0),
         friction=40.0,
         friction_std=2.0,
         speed=0.05,
