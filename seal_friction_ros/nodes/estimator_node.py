@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from functools import partial
 from operator import itemgetter
-from typing import Any, NamedTuple
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
@@ -78,14 +78,6 @@ _TOPIC_OF = {type_name: topic for topic, type_name in OUTPUTS.items()}
 def _lateness(source: int) -> int:
     """Time [ns] since a message was sent at ``source`` [ns of the system clock]; 0 if the middleware does not tell."""
     return time.time_ns() - source if source else 0
-
-
-class _Counted(NamedTuple):
-    """An input, and who counts its messages."""
-
-    plan: TopicPlan
-    type_name: str
-    listeners: list[EstimatorDiagnostics]
 
 
 class EstimatorNode(ManagedNode):
@@ -226,10 +218,7 @@ class EstimatorNode(ManagedNode):
             for number, actuator in enumerate(self._file.actuators)
         }
         every = list(self._statistics.values())
-        self._counted = {
-            topic: _Counted(self._plans[topic], type_name, [every[number] for number, _ in self._plans[topic].taken])
-            for topic, type_name in self._types.items()
-        }
+        self._listeners = {topic: [every[number] for number, _ in self._plans[topic].taken] for topic in self._types}
         self._lowest = [Lowest() for _ in every]
 
     def start(self) -> None:
@@ -290,7 +279,7 @@ class EstimatorNode(ManagedNode):
         began = time.perf_counter_ns()
         if not self.active:
             return
-        plan, type_name, listeners = self._counted[name]
+        plan = self._plans[name]
         try:
             message = plan.read(data)
         except ValueError as error:
@@ -305,14 +294,14 @@ class EstimatorNode(ManagedNode):
         done = time.perf_counter_ns()
 
         # Nobody waits for what follows.
-        topic = self._topics[name]
+        topic, type_name = self._topics[name], self._types[name]
         self.recording.record(topic, type_name, received, data, sent)
         if self.has_viewer:
             self._newest_inputs[topic] = TopicMessage(topic, type_name, data)
         if not plan.holds_records:
             self._newest[name] = data
         stamp = message.stamp if plan.holds_records else None
-        for listener in listeners:
+        for listener in self._listeners[name]:
             listener.on_input(name, stamp, lateness)
         if self._sent:
             self._record_answers(commands, done - began)
@@ -322,7 +311,7 @@ class EstimatorNode(ManagedNode):
 
     def _on_malformed(self, name: str, error: ValueError) -> None:
         """Count a message that cannot be read, and say why."""
-        for listener in self._counted[name].listeners:
+        for listener in self._listeners[name]:
             listener.on_malformed(name)
         self.get_logger().error(f'{self._topics[name]}: {error}', throttle_duration_sec=1.0)
 

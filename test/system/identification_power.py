@@ -2,10 +2,11 @@
 
 ``python test/system/identification_power.py --draws 200``. Noise is of each reading, five in each direction at each
 pressure, or of a whole pressure, as if it was held on another day. Exit code 1 if a flat law is recommended where the
-friction rises, unless whole pressures are off by 10 %.
+friction of the draw rises by more than four standard errors of that noise.
 """
 
 import itertools
+import math
 import sys
 from collections import Counter
 from collections.abc import Callable
@@ -39,6 +40,7 @@ SEALS: dict[str, Callable[[float], float]] = {
 PRESSURES = {3: (1.0, 3.0, 5.0), 4: (1.0, 3.0, 5.0, 7.0), 5: (1.0, 2.0, 3.0, 5.0, 7.0)}  # [bar]
 NOISES = (0.01, 0.03, 0.1)
 REPEATED = 5  # readings in each direction at each pressure
+EVIDENT = 4.0  # [-] standard errors
 REPEATS_WITHIN = 0.01  # scatter of the readings where a whole pressure is off
 
 
@@ -59,6 +61,16 @@ def readings_of(
     return prepare_manual_readings([manual], [], 1).readings
 
 
+def rise(readings: FrictionReadings, error: float) -> float:
+    """Rise of the friction over the pressures in standard errors; ``error`` is that of the friction of a pressure [-].
+
+    Of the slope of a line: its standard error is that of the friction over the norm of the pressures about their mean.
+    """
+    pressure, friction = readings.level_pressures, readings.half_ranges[0]
+    centred = pressure - pressure.mean()
+    return float(centred @ friction / (error * friction.mean() * np.linalg.norm(centred)))
+
+
 def law_of(readings: FrictionReadings) -> tuple[str, bool]:
     """Recommended law, and whether a pressure was taken for an outlier."""
     laws = candidate_laws(variation_of(readings))
@@ -71,11 +83,14 @@ def law_of(readings: FrictionReadings) -> tuple[str, bool]:
 
 
 def case(draws: int, seal: str, count: int, noise: float, of_pressure: bool) -> tuple[list[str], int]:
-    """Texts of a row, and how often a flat law was recommended for a friction that rises."""
-    found = [law_of(readings_of(seal, PRESSURES[count], noise, of_pressure, seed)) for seed in range(draws)]
-    flat = sum(name == 'constant_coulomb' for name, _ in found)
+    """Texts of a row, and how often a flat law was recommended against `EVIDENT` standard errors of the noise."""
+    error = noise if of_pressure else noise / math.sqrt(2.0 * REPEATED)
+    draws_of = [readings_of(seal, PRESSURES[count], noise, of_pressure, seed) for seed in range(draws)]
+    found = [law_of(readings) for readings in draws_of]
+    is_flat = [name == 'constant_coulomb' for name, _ in found]
+    wrong = sum(flat and rise(each, error) > EVIDENT for flat, each in zip(is_flat, draws_of, strict=True))
+    flat = sum(is_flat)
     right = flat if seal == '3' else draws - flat
-    wrong = 0 if seal == '3' or (of_pressure and noise >= NOISES[-1]) else flat
     names = Counter(name.removeprefix('pressure_power_law_') for name, _ in found)
     texts = [
         'pressure' if of_pressure else 'reading', seal, str(count), f'{100.0 * noise:g}',

@@ -188,9 +188,7 @@ def design_experiment(
     speeds = _grid_speeds(used_speeds)
     prior = _prior(model, *pressures, speeds)
     at_readings = model.slopes(at)
-    two_sided = [source for source, index in enumerate(readings.two_sided) if len(index)]
-    offsets = at.direction[:, np.newaxis] * (readings.source[:, np.newaxis] == two_sided)
-    had = _without_offsets(_information(at_readings, offsets, readings.scale * scatter), len(model.law.parameters))
+    had = _information_at_hand(at_readings, at.direction, readings, scatter)
     had = had / _readings_worth_one(chosen, readings, scatter)
 
     range_slopes = _relative_slopes(model, pressures, speeds)
@@ -227,6 +225,15 @@ def design_experiment(
         speed_is_measured=is_measured,
         speed_is_varied=is_varied,
     )
+
+
+def _information_at_hand(
+    slopes: FloatArray, direction: FloatArray, readings: FrictionReadings, scatter: float
+) -> FloatArray:
+    """Information of the readings about the parameters, offsets of sources with both directions eliminated."""
+    two_sided = [source for source, index in enumerate(readings.two_sided) if len(index)]
+    offsets = direction[:, np.newaxis] * (readings.source[:, np.newaxis] == two_sided)
+    return _without_offsets(_information(slopes, offsets, readings.scale * scatter), slopes.shape[1])
 
 
 def laws_not_beaten(scores: Scores) -> list[LawScore]:

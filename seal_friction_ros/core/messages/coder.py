@@ -22,6 +22,7 @@ def _encoder(layout: Layout) -> Callable[[int, bytes, tuple[Any, ...]], bytes]:
     packers: dict[int, Callable[..., bytes]] = {}  # by the length of the frame name with its end
 
     def encode_numbers(stamp: int, frame_id: bytes, numbers: tuple[Any, ...]) -> bytes:
+        """Bytes of one message."""
         length = len(frame_id) + 1
         pack = packers.get(length)
         if pack is None:

@@ -84,12 +84,14 @@ def collected(
     kinds = {one.topic: (kind, one.type_name) for kind, one in enumerate(wanted.values(), start=1) if one.topic}
 
     def kind_of(topic: str, type_name: str) -> int:
+        """Number of what a topic holds, 0 for what nobody wants; UnsuitedError for two types on one topic."""
         kind, known = kinds.get(topic, (0, type_name))
         if type_name != known:
             raise UnsuitedError(f'{topic} has messages of {known} and of {type_name}')
         return kind
 
     def fill(blocks: Iterable[Messages]) -> _Collector:
+        """Collector of all blocks."""
         collector = make()
         with progress(f'read {bag.path.name}', bag.total) as advance:
             for block in blocks:
@@ -158,6 +160,7 @@ class _VelocityCollector:
         self._configuration: Configuration | None = None
 
     def add(self, block: Block) -> None:
+        """Take the configurations, and a row for each velocity with what holds then."""
         for _, _, text in block.decoded('configuration', decode_text):
             self._configuration = parse_snapshot(text).configuration
         found = {name: block.of(name) for name in INPUTS}

@@ -81,6 +81,7 @@ class _Track:
         self._measured = array('d')
 
     def take(self, record: Input) -> None:
+        """Keep the position of a reference or of the rod."""
         if isinstance(record, ServoReference):
             self._wanted.extend((record.stamp, record.position))
         elif isinstance(record, Position):

@@ -93,6 +93,7 @@ class _Stamps:
         self._malformed: Counter[str] = Counter()
 
     def add(self, message: BagMessage) -> None:
+        """Take one message; of a type without a definition nothing is counted."""
         topic, kind = message.topic, short_name(message.type_name)
         if topic not in self._readers:
             self._readers[topic], self._repairs[topic] = None, StampRepair()
@@ -108,6 +109,7 @@ class _Stamps:
             self._malformed[topic] += 1
 
     def found(self) -> dict[str, dict[str, int]]:
+        """Counts of each topic on which something is wrong."""
         return {
             topic: {
                 'jumps of the stamp': repair.jumps,

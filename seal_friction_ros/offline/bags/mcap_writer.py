@@ -63,6 +63,7 @@ class _Chunk:
         self._index: dict[int, list[tuple[int, int]]] = {}  # channel -> log time and offset of each of its messages
 
     def add(self, channel: int, log_time: int, publish_time: int, data: bytes) -> None:
+        """Add a message; both times [ns]."""
         if not self._index:
             self.first_time = log_time
         self.last_time = log_time

@@ -55,6 +55,7 @@ class _Topic:
         return any(f'{quantity}[{joint}]' in self.step for quantity in ('position', 'velocity'))
 
     def take(self, path: str, value: float) -> None:
+        """Take one value of a field; one that is not finite tells nothing."""
         if math.isfinite(value):
             self.low[path] = min(value, self.low.get(path, value))
             self.high[path] = max(value, self.high.get(path, value))

@@ -294,6 +294,7 @@ def quantities(*units: str) -> Callable[[str], tuple[float, ...]]:
     """Type of an option: numbers in SI or with a unit, separated by commas, one for each of these ``units`` of SI."""
 
     def values(text: str) -> tuple[float, ...]:
+        """Numbers in SI."""
         parts = text.split(',')
         if len(parts) != len(units):
             raise argparse.ArgumentTypeError(f'{text} is not {len(units)} values, separated by commas')

@@ -106,6 +106,7 @@ def uncertain_ring(
     names, drawn = _drawn(case.name, file.unknown, samples, seed)
 
     def parts_of(values: Mapping[str, float]) -> list[Part]:
+        """The ring with these values of what is unknown."""
         varied = varied_ring(case, values)
         check_pressures(varied, pressures)
         key = part_key('ring', [asdict(varied), pressures, type(law).__name__, asdict(law) if law else {}])

@@ -378,7 +378,6 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
     """Numbers for JSON."""
     data, selection, quality, levels = found.data, found.selection, found.quality, found.levels
     reference = selection.reference
-    correction = data.correction if isinstance(data.correction, ForceCorrection) else None
     numbers: dict[str, Any] = found.document['identification'] | rounded_numbers(
         {
             'std_N': [level.std for level in levels],
@@ -394,38 +393,14 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
             'condition_number': selection.fit.condition_number,
             'correlation': selection.fit.correlation.tolist(),
             'offset_N': [level.offset for level in levels],
-            'area_correction_m2': correction.area if correction else None,
-            'area_correction': correction
-            and {
-                'chamber': correction.chamber,
-                'is_made': correction.is_significant,
-                'standard_error_m2': correction.standard_error,
-            },
-            'offset_line': correction
-            and {
-                'constant_N': correction.line.constant,
-                'area_error_m2': correction.line.area_error,
-                'rms_N': correction.line.rms,
-            },
+            **_correction_numbers(data.correction if isinstance(data.correction, ForceCorrection) else None),
             'between_run_std': quality.between_runs.std,
             'between_runs_measured': quality.between_runs.measured,
             'told_apart_std': quality.told_apart,
             'calibration': {name: getattr(quality.calibration, name).tolist() for name in Calibration._fields[:3]},
             'drift': [level.drift for level in levels],
             'settled': selection.settled and _settled_numbers(selection.settled, quality),
-            'run_in': [
-                {
-                    'source': data.sources.files[drift.source].name,
-                    'pressure_Pa': data.prepared.readings.level_pressures[drift.level],
-                    'change': drift.change,
-                    'asymptote_N': drift.asymptote,
-                    'length_m': drift.length,
-                    'is_evident': drift.is_evident,
-                    'settled_share': drift.settled_share,
-                    'settled_std': drift.settled_std,
-                }
-                for drift in quality.drifts
-            ],
+            'run_in': _run_in_numbers(data, quality.drifts),
         }
     )
     return numbers | {
@@ -441,6 +416,39 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
         'remarks': list(found.remarks),
         **rounded_numbers(kinds_numbers(found)),
     }
+
+
+def _correction_numbers(correction: ForceCorrection | None) -> dict[str, Any]:
+    """The area that the force sum misses; None of each if it was not looked for."""
+    if correction is None:
+        return dict.fromkeys(('area_correction_m2', 'area_correction', 'offset_line'))
+    line = correction.line
+    return {
+        'area_correction_m2': correction.area,
+        'area_correction': {
+            'chamber': correction.chamber,
+            'is_made': correction.is_significant,
+            'standard_error_m2': correction.standard_error,
+        },
+        'offset_line': {'constant_N': line.constant, 'area_error_m2': line.area_error, 'rms_N': line.rms},
+    }
+
+
+def _run_in_numbers(data: IdentificationData, drifts: Sequence[Drift]) -> list[dict[str, Any]]:
+    """Drift of the friction over each run."""
+    return [
+        {
+            'source': data.sources.files[drift.source].name,
+            'pressure_Pa': data.prepared.readings.level_pressures[drift.level],
+            'change': drift.change,
+            'asymptote_N': drift.asymptote,
+            'length_m': drift.length,
+            'is_evident': drift.is_evident,
+            'settled_share': drift.settled_share,
+            'settled_std': drift.settled_std,
+        }
+        for drift in drifts
+    ]
 
 
 def _settled_numbers(settled: SettledLaw, quality: LawQuality) -> dict[str, Any]:

@@ -161,6 +161,7 @@ def kinds_of_topics(topics: Topics) -> KindOf:
     }
 
     def kind_of(topic: str, type_name: str) -> Kind:
+        """What a message is; UnsuitedError for simulated time and for two types on one topic."""
         other = Kind.OTHER_ESTIMATE if type_name == ESTIMATE_TYPE else Kind.OTHER
         wanted, kind = known.get(topic, (type_name, other))
         if topic == topics.clock:

@@ -27,6 +27,7 @@ class _CommandCollector:
         self.columns = growing(2 + sum(_HELD.values()))
 
     def add(self, block: Block) -> None:
+        """Take a row for each velocity: its stamp [s], itself, and what holds then."""
         commands = [(place, number) for place, _, number in block.decoded('command', self._number)]
         places, numbers = np.array(commands).reshape(-1, 2).T
         found = {name: block.of(name) for name in ('pressure', 'position')}

@@ -326,6 +326,7 @@ class _AxisCollector(RunCollector):
         self._references: list[tuple[Numbers, IntArray]] = []  # with the number of estimates before each
 
     def add(self, block: Block) -> None:
+        """Take the references, each with the number of estimates before it, and the estimates."""
         references = block.of('reference')
         before = len(self.stamps) + np.searchsorted(block.of('estimate').places, references.places)
         self._references.append((references, before))

@@ -73,6 +73,7 @@ class _Running:
         self._start = (str(Path.cwd()), dict(versions()))
 
     def begin(self, number: int) -> None:
+        """Submit a call."""
         call = self._calls[number]
         future = self._client.submit(_run, call, _paths_here(call), *self._start, pure=False)
         self.futures[number] = future
