@@ -56,7 +56,10 @@ def main() -> None:
         print(json.dumps({'control_period': PERIOD, 'rows': rows}))
         return
     show(
-        [{'inner step [us]': f'{1e6 * row.pop("inner_step"):.0f}', **row} for row in rows],
+        [
+            {'inner step [us]': f'{1e6 * row["inner_step"]:.0f}', 'step': row['step'], 'simulate': row['simulate']}
+            for row in rows
+        ],
         f'Sample {PERIOD * 1e3:g} ms; times real time',
     )
 

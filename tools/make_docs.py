@@ -120,7 +120,7 @@ def friction_laws() -> str:
     """A section for each law of the registry: name in a seal file, equation, other keys it takes, parameters."""
     sections = []
     for law in FRICTION_LAWS:
-        about = inspect.cleandoc(law.__doc__ or '').split('\n\nRaises:')[0]
+        about = re.split(r'\n\n(?:Raises|ValueError):', inspect.cleandoc(law.__doc__ or ''))[0]
         others = ', '.join(f'`{key}`' for key in sorted(keys_of_law(law) - {law.PART or law.NAME}))
         text = f'### `coulomb_law: {law.NAME}`\n\nEquation: {law.FORMULA}. {about}'
         text += f'\n\nIt takes {others} from the seal file.' if others else ''

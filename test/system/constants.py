@@ -2,7 +2,7 @@
 
 ``python test/system/constants.py [--logs FOLDER]``. For each the three figures that move most, relative to those of the
 constant as it is: errors [N] of `compare_estimators`, shares of good samples and, as a difference, of wrong ones among
-them in `attacks`. A constant that moves nothing has no reason to be there, unless a test holds it.
+them in `attacks`. A constant that moves nothing can go, unless a test needs it.
 """
 
 import itertools

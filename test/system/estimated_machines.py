@@ -91,6 +91,8 @@ def main() -> int:
     for machine in (m for m in MACHINES if options.only in m.name):
         with tempfile.TemporaryDirectory() as folder:
             seals = identified(machine, options.seed, Path(folder))
+        if seals is None:
+            rows[f'{machine.name}: refused'] = {}
         for day, has_load in itertools.product(DAYS if seals else (), (True, False)):
             found = score(machine, seals, day, has_load, options.seed)
             rows[f'{machine.name}, {day:g}' + ('' if has_load else ', no load cell')] = found._asdict()

@@ -12,11 +12,11 @@ class NotConvergedError(ValueError):
 def named_errors(
     where: object, caught: type[Exception] = ValueError, raised: type[ValueError] = ValueError
 ) -> Iterator[None]:
-    """Convert an error of the block to ``where: reason``; one of another type ``raised`` is named already."""
+    """Convert an error of the block to ``where: reason``; an error that already is of another type ``raised`` passes."""
     try:
         yield
     except caught as error:
-        if raised is not caught and isinstance(error, raised):
+        if raised not in (ValueError, caught) and isinstance(error, raised):
             raise
         reason = error.strerror if isinstance(error, OSError) else None
         raise raised(f'{where}: {reason or error}') from None

@@ -28,7 +28,7 @@ def interpolated(
     knots, shape (n - 1,), ``value`` its ordinate. A bound function takes two arguments, so one is not used.
     """
     if x >= knots[-1]:
-        return last + slope_beyond * (x - knots[-1])
+        return last + slope_beyond * (x - knots[-1]) if slope_beyond else last  # at an infinite x, too
     x = max(x, knots[0])
     i = bisect_right(knots, x) - 1
     t = x - knots[i]
@@ -36,9 +36,9 @@ def interpolated(
 
 
 class MonotoneTable:
-    """Monotone piecewise cubic through points [Fritsch1980]_; constant beyond both ends.
+    """Monotone piecewise cubic through points [Fritsch1980]_, constant beyond both ends.
 
-    A table that ``rises`` goes on above its last point with the slope that it has there.
+    Above its last point a table that ``rises`` is no constant but goes on with the slope that it has there.
 
     ``scipy.interpolate.PchipInterpolator`` gives the coefficients. `interpolated` evaluates one value twenty times
     faster than SciPy, since the live estimate asks for one value at a time. Abscissae x and ordinates y have the shape

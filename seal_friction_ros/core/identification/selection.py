@@ -77,6 +77,8 @@ def rises_over_pressures(readings: FrictionReadings) -> bool:
     if readings.are_samples or len(readings.levels) < 3:
         return False
     pressure, friction = readings.level_pressures, readings.half_ranges[0]
+    if (friction <= 0.0).any():
+        return False
     centred = pressure - pressure.mean()
     return float(centred @ friction) > RISES * LEVEL_SCATTER * float(friction.mean() * np.linalg.norm(centred))
 

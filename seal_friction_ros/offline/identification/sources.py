@@ -340,6 +340,8 @@ def _admitted(log: RecordedLog) -> tuple[RecordedLog, tuple[str, ...]]:
 def _from_the_first(temperature: FloatArray) -> FloatArray:
     """A temperature that holds before its first message, too: a sensor of 1 Hz comes after the first samples."""
     known = np.isfinite(temperature)
+    if not known.any():
+        return temperature
     first = int(np.argmax(known))
     return np.concatenate((np.full(first, temperature[first]), temperature[first:]))
 

@@ -124,10 +124,11 @@ def _shared_memory(environment: Mapping[str, str]) -> Finding:
     if not os.access(SHARED_MEMORY, os.W_OK):
         return Finding(Level.NOTE, 'shared memory', f'{SHARED_MEMORY} cannot be written: Fast DDS falls back to UDP')
     free = shutil.disk_usage(SHARED_MEMORY).free
-    files = sum(len(list(SHARED_MEMORY.glob(name))) for name in ('fastrtps_*', 'fastdds_*'))  # Jazzy, Kilted
+    names = ('fastrtps_*', 'fastdds_*')  # Jazzy, Kilted
+    files = sum(len(list(SHARED_MEMORY.glob(name))) for name in names)
     text = f'{free >> 20} MiB free, {files} files of Fast DDS'
     if free < SMALLEST_SHARED_MEMORY:
-        return Finding(Level.NOTE, 'shared memory', f'{text}: with no node running, remove {SHARED_MEMORY}/fast*_*')
+        return Finding(Level.NOTE, 'shared memory', f'{text}: with no node running, remove {" and ".join(names)} there')
     return Finding(Level.OK, 'shared memory', text)
 
 

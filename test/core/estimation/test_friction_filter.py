@@ -327,11 +327,12 @@ VARIED = {'frictions': (40.0, 80.0, 20.0, 60.0), 'speeds': (0.05, 0.2, 0.02, 0.1
 LAW = Terms(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 MACHINES = {
     'scale': LAW._replace(scale=1.4),
+    'coulomb': LAW._replace(coulomb=15.0),
     'viscous': LAW._replace(viscous=60.0),
     'asymmetry': LAW._replace(asymmetry=0.15),
     'offset': LAW._replace(offset=70.0),
     'gradient': LAW._replace(gradient=800.0),
-    'all': Terms(0.7, 0.0, 40.0, -0.1, -50.0, 300.0, 0.0, 0.0),
+    'all': Terms(0.7, 8.0, 40.0, -0.1, -50.0, 300.0, 0.0, 0.0),
 }
 
 
@@ -339,7 +340,7 @@ MACHINES = {
 def test_strokes_at_several_pressures_and_speeds_tell_each_term(name):
     machine = Machine(MACHINES[name], **VARIED)
     prior, found = stds(after(list(readings(machine, 60.0))[:1])), after(readings(machine, 120.0))
-    for term in ('scale', 'viscous', 'asymmetry', 'offset', 'gradient'):
+    for term in ('scale', 'coulomb', 'viscous', 'asymmetry', 'offset', 'gradient'):
         std = getattr(stds(found), term)
         assert abs(getattr(found.terms, term) - getattr(machine.terms, term)) < 3.0 * std, term
         assert std < 0.25 * getattr(prior, term), term

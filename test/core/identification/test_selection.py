@@ -124,12 +124,14 @@ def test_asymmetry_takes_both_directions_and_several_pressures_of_one_source():
 
 @pytest.mark.parametrize(('errors', 'rises'), [(1.99, False), (2.01, True), (-9.0, False)])
 def test_friction_rises_from_two_standard_errors_of_8_percent_a_pressure_on(errors, rises):
-    bars = np.array([10.0, 20.0, 30.0, 40.0])
+    bars = np.array([10.0, 15.0, 30.0, 45.0])
     slope = errors * 0.08 * 10.0 / np.linalg.norm(bars - bars.mean())
     made = readings(bars, force=np.repeat(10.0 + slope * (bars - bars.mean()), 2))
     assert rises_over_pressures(made) is rises
     assert not rises_over_pressures(replace(made, are_samples=True))
     assert not rises_over_pressures(made.taken(made.level < 2))  # two pressures are a line in any case
+    for share in (-1.0, 0.0):  # friction at each pressure, or nothing is said
+        assert not rises_over_pressures(replace(made, force=np.where(made.level == 1, share * made.force, made.force)))
 
 
 # --- which laws are beaten, and which compete ---

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import time
 from contextlib import closing
 from http.client import HTTPConnection
 from pathlib import Path
@@ -148,8 +149,9 @@ def test_the_monitor_shows_every_actuator(command, kind):
         assert process.stdout is not None
         url = urlsplit(json.loads(process.stdout.readline())['url'])
         with closing(HTTPConnection(url.netloc, timeout=60.0)) as connection:
-            found = {'time': 0.0}
+            found, deadline = {'time': 0.0}, time.monotonic() + 60.0
             while found['time'] < 4.3:  # the bag is being read
+                assert time.monotonic() < deadline, f'read up to {found["time"]} s'
                 connection.request('GET', f'/view?since=4&until=4.3&{url.query}')
                 found = json.loads(connection.getresponse().read())
         process.terminate()

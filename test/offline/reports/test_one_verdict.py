@@ -91,10 +91,11 @@ CHANGES = {'good': 'no change beyond the noise', 'weaker': 'sliding friction -17
 
 
 def told(capsys, *words) -> dict:
-    main([*map(str, words), '--json'])
+    code = main([*map(str, words), '--json'])
     said = capsys.readouterr()
     found = json.loads(said.out or '{"errors": [""]}')
     if found.get('errors'):  # refused
+        assert code == 2
         assert '\n' not in said.err.strip()
         raise BagError(said.err)
     return found
@@ -136,11 +137,17 @@ def by_live_view(bags, name, tmp_path, capsys):
 def test_a_run_has_one_verdict_with_the_reason_that_decides(ask, name, bags, tmp_path, capsys):
     try:
         level, reason = ask(bags, name, tmp_path, capsys)
-    except BagError as error:  # exit code 2
+    except BagError as error:
+        assert name == 'empty'
         level, reason = 'bad', str(error)
     wanted, words = RUNS[name]
     words = CHANGES.get(name, words) if ask is by_compare else words
     assert (level, words.lower() in reason.lower()) == (wanted, True), reason
+
+
+def test_a_first_bag_without_a_message_is_refused_too(bags, tmp_path, capsys):
+    with pytest.raises(BagError, match='nothing to estimate from'):
+        told(capsys, 'compare', bags / 'empty', bags / 'good', '--out', tmp_path / 'page.html')
 
 
 @pytest.fixture(scope='module')

@@ -19,7 +19,9 @@ class ShearLaw(CheckedParameters):
 
     It belongs to rubber, wall and lubricant, and holds for a ring of any size. n = 1 is a constant coefficient of
     friction; n = 0 is the limit of a constant shear stress over the real contact, where that is all of the contact. The
-    form is our choice. ValueError: a value is out of bounds.
+    form is our choice.
+
+    ValueError: a value is out of bounds.
     """
 
     shear_stress: float = parameter(
@@ -44,7 +46,9 @@ class ContactShear(ShearLaw, FrictionLaw):
         A_n = \int (\sigma / 1\,\mathrm{MPa})^n\,dA
 
     `seal_friction oring` computes A_n at each pressure by finite elements. Above the last pressure A_n rises with the
-    slope that it has there (our choice). ValueError: fewer than two pressures, pressures that do not increase, or an
+    slope that it has there (our choice).
+
+    ValueError: fewer than two pressures, pressures that do not increase, or an
     area that is not positive or falls.
     """
 

@@ -48,7 +48,9 @@ class NormalForceTable(NormalForceLaw):
     """Normal force by monotone interpolation of computed or measured values over pressure.
 
     Above the last pressure the normal force rises with the slope that it has there (our choice: rubber under pressure
-    behaves as a fluid, so the normal force keeps rising). ValueError: fewer than two points, or pressures or forces
+    behaves as a fluid, so the normal force keeps rising).
+
+    ValueError: fewer than two points, or pressures or forces
     that do not increase, or a force that is not positive.
     """
 

@@ -1,7 +1,7 @@
 """What the velocity adds to a law that does not depend on the speed: viscous and Stribeck friction, asymmetry."""
 
 import math
-from dataclasses import astuple, dataclass
+from dataclasses import asdict, dataclass
 from typing import NamedTuple
 
 from seal_friction_ros.core.foundation.compiled import compilable
@@ -87,4 +87,4 @@ class VelocityTerms(CheckedParameters):
     @property
     def numbers(self) -> VelocityTermNumbers:
         """The terms as numbers."""
-        return VelocityTermNumbers(*astuple(self))
+        return VelocityTermNumbers(**asdict(self))
