@@ -14,8 +14,11 @@ from paths import ROOT
 SIZE = (1400, 765)  # [px] the first four plots
 PATIENCE = 120.0  # [s] until the simulator runs: it may compile first
 SEALS = {'seals': ['ms28775_114@a', 'ms28775_114@b']}
-UNDISTURBED = 'columns.status.slice(-500).every((bits) => (bits & ~0xa0000) === 0) && now.verdict === "good"'
-"""No bit for 5 s but those of every reversal: the picture shows no machine that is busy with other things."""
+UNDISTURBED = (
+    'columns.status.slice(-500).every((bits) => (bits & ~0xa0000) === 0)'
+    ' && now.verdict === "good" && /^sliding/.test(byId("state").textContent)'
+)
+"""The rod slides, and for 5 s there was no bit but those of every reversal: the machine is not busy otherwise."""
 MOTION = {'sine.amplitude': 0.004, 'sine.frequency': 1.0}  # [m], [Hz]
 
 

@@ -71,30 +71,29 @@ def rise(readings: FrictionReadings, error: float) -> float:
     return float(centred @ friction / (error * friction.mean() * np.linalg.norm(centred)))
 
 
-def law_of(readings: FrictionReadings) -> tuple[str, bool]:
-    """Recommended law, and whether a pressure was taken for an outlier."""
+def law_of(readings: FrictionReadings, error: float) -> tuple[str, float, bool]:
+    """Recommended law, `rise` of what it was chosen from, and whether a pressure was taken for an outlier."""
     laws = candidate_laws(variation_of(readings))
     outlier = diagnostics.outlying_level([law for law in laws if law.fixed], readings)
     if outlier is not None:
         readings = readings.without(readings.level == outlier.level)
     variation = variation_of(readings)
     scores = score_ladder(candidate_laws(variation), readings, variation)
-    return recommended(scores, rises=rises_over_pressures(readings)).law.name, outlier is not None
+    chosen = recommended(scores, rises=rises_over_pressures(readings))
+    return chosen.law.name, rise(readings, error), outlier is not None
 
 
 def case(draws: int, seal: str, count: int, noise: float, of_pressure: bool) -> tuple[list[str], int]:
     """Texts of a row, and how often a flat law was recommended against `EVIDENT` standard errors of the noise."""
     error = noise if of_pressure else noise / math.sqrt(2.0 * REPEATED)
-    draws_of = [readings_of(seal, PRESSURES[count], noise, of_pressure, seed) for seed in range(draws)]
-    found = [law_of(readings) for readings in draws_of]
-    is_flat = [name == 'constant_coulomb' for name, _ in found]
-    wrong = sum(flat and rise(each, error) > EVIDENT for flat, each in zip(is_flat, draws_of, strict=True))
-    flat = sum(is_flat)
+    found = [law_of(readings_of(seal, PRESSURES[count], noise, of_pressure, seed), error) for seed in range(draws)]
+    flat = sum(name == 'constant_coulomb' for name, _, _ in found)
+    wrong = sum(name == 'constant_coulomb' and risen > EVIDENT for name, risen, _ in found)
     right = flat if seal == '3' else draws - flat
-    names = Counter(name.removeprefix('pressure_power_law_') for name, _ in found)
+    names = Counter(name.removeprefix('pressure_power_law_') for name, _, _ in found)
     texts = [
         'pressure' if of_pressure else 'reading', seal, str(count), f'{100.0 * noise:g}',
-        f'{100.0 * right / draws:.1f}', f'{100.0 * np.mean([out for _, out in found]):.1f}', str(wrong),
+        f'{100.0 * right / draws:.1f}', f'{100.0 * np.mean([out for _, _, out in found]):.1f}', str(wrong),
         ', '.join(f'{name} {n}' for name, n in names.most_common()),
     ]  # fmt: skip
     return texts, wrong

@@ -12,7 +12,7 @@ class NotConvergedError(ValueError):
 def named_errors(
     where: object, caught: type[Exception] = ValueError, raised: type[ValueError] = ValueError
 ) -> Iterator[None]:
-    """Convert an error of the block to ``where: reason``; an error that already is of another type ``raised`` passes."""
+    """Convert an error of the block to ``where: reason``; one that already is of another type ``raised`` passes."""
     try:
         yield
     except caught as error:

@@ -67,6 +67,7 @@ class NodeView:
         self._remembered = remembered
         self._followers: dict[str, Follower] = {}
         self._tracking: dict[str, TrackingFollower] = {}
+        self._had_placeholder: set[str] = set()
         self._found: dict[str, tuple[int, list[Finding]]] = {}
 
     @property
@@ -102,6 +103,7 @@ class NodeView:
         """
         snapshot = parse_machine_text(text)
         self.known = {name: known_of(one) for name, one in snapshot.configurations.items()}
+        self._had_placeholder |= {name for name, one in self.known.items() if one.has_placeholder}
         if snapshot.file.document is not None:
             machine, _ = machine_of(snapshot, self._definitions_of(snapshot.file.topics.values()))
             if self._machine is None or machine.file != self._machine.file:
@@ -180,11 +182,14 @@ class NodeView:
         follower = self._followers.get(actuator)
         if follower is None:
             return []
-        key = self.held[actuator].estimate.stamp // 1_000_000_000 if until is None else until
+        held, known = self.held.get(actuator, NOTHING_HELD), self.known.get(actuator, UNKNOWN_CONFIGURATION)
+        key = held.estimate.stamp // 1_000_000_000 if until is None else until
         if self._found.get(actuator, (None,))[0] != key:
             seen = follower.seen(math.inf if until is None else until * 1e-9)
-            known = self.known[actuator]
-            found = findings_of(seen, has_placeholder=known.has_placeholder, uses_scale=known.adaptation == 'on')
+            # A recorded run is judged as a report judges it: placeholder seals at any time make it bad.
+            is_recorded = not math.isfinite(self._remembered)
+            has_placeholder = known.has_placeholder or (is_recorded and actuator in self._had_placeholder)
+            found = findings_of(seen, has_placeholder=has_placeholder, uses_scale=known.adaptation == 'on')
             if until is None and actuator in self._tracking:
                 found = [*raised(self._tracking[actuator].evaluation()), *found]
             self._found[actuator] = key, found

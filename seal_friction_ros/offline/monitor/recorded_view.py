@@ -180,8 +180,8 @@ class RecordedView:
                     while not self._is_read and time.monotonic() < end:
                         self._read_row()
                 time.sleep(_PAUSE)  # else who waits for the lock does not get it
-        except ValueError as error:
-            self._failure, self._is_read = str(error), True
+        except Exception as error:  # noqa: BLE001  of any damage: else the page would wait for the rest for ever
+            self._failure, self._is_read = ' '.join(str(error).split()) or type(error).__name__, True
         return self
 
     def _read_row(self) -> None:

@@ -142,6 +142,8 @@ class TrackingFollower:
         """Take one estimate: time [s], velocity, position, reference, state and feed-forward force."""
         if self._rows and 0.0 <= row[0] - self._rows[-1][0] < 0.99 * self.PERIOD:
             return
+        if self._rows and row[0] < self._rows[-1][0]:  # the clock was set back
+            self._rows.clear()
         self._rows.append(row)
         while self._rows[0][0] < row[0] - self._kept:
             self._rows.popleft()

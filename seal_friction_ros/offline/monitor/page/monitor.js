@@ -641,13 +641,14 @@ const goTo = (time) => {
 
 // The next fault after the middle of the window; after the last one the first.
 function nextFault() {
-  const starts = about.faults[label].map(([begin]) => begin), middle = Number(byId('time').value) - span / 2;
+  const starts = (about.faults[label] ?? []).map(([begin]) => begin), middle = Number(byId('time').value) - span / 2;
   if (starts.length) goTo(starts.find((begin) => begin > middle + 0.06) ?? starts[0]);
 }
 
 // Above the slider: friction of the whole bag, a tick for each reversal, and a mark for each fault, which goes there.
 function writeMarks() {
-  const share = (time) => `${100 * Math.max(time, 0) / about.duration}%`;
+  if (!about.overview[label]) return; // an actuator that came while the bag is read
+  const duration = about.duration || 1, share = (time) => `${100 * Math.max(time, 0) / duration}%`;
   const faults = about.faults[label], {curve, reversals} = about.overview[label];
   replaceIfChanged(byId('marks'), faults, () => faults.map(([begin, last, words]) => {
     const made = element('button');
@@ -660,7 +661,7 @@ function writeMarks() {
     return made;
   }));
   byId('next-fault').disabled = !faults.length;
-  const x = (time) => (1000 * time / about.duration).toFixed(1), known = curve.filter((point) => point[1] !== null);
+  const x = (time) => (1000 * time / duration).toFixed(1), known = curve.filter((point) => point[1] !== null);
   const [low, high] = [Math.min(...known.map((point) => point[1])), Math.max(...known.map((point) => point[2]))];
   const y = (force) => (32 - 30 * (force - low) / (high - low || 1)).toFixed(1);
   const path = curve.map(([time, least, most], place) => (
