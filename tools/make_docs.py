@@ -79,33 +79,48 @@ RECORDS = (
     OringCase,
     ShearLaw,
     MeasuredFriction,
-    StudySeal,
-    Topography,
-    Grease,
-    GrooveSpring,
-    AirPressure,
-    ConstantAcceleration,
-    StudyNumerics,
-    ControlEdge,
-    FilmSupply,
-    Viscoelasticity,
-    ShearStressStudy,
-    MapGrid,
-    SpoolSeal,
     SavitzkyGolay,
     Sliding,
     SpoolEvaluation,
 )
 
+LUBRICATION_PARTS = {
+    'seal': StudySeal,
+    'topography': Topography,
+    'grease': Grease,
+    'groove': GrooveSpring,
+    'air': AirPressure,
+    'motion': ConstantAcceleration,
+    'numerics': StudyNumerics,
+    'control_edge': ControlEdge,
+    'film_supply': FilmSupply,
+    'viscoelasticity': Viscoelasticity,
+    'study': ShearStressStudy,
+    'map': MapGrid,
+    'seals[]': SpoolSeal,
+}
+HEAD = ('| name | unit | default | bounds | meaning |', '|---|---|---|---|---|')
+
 
 def table(record_type: type) -> str:
     """Markdown table of the described fields of a dataclass."""
+    return '\n'.join((*HEAD, *_rows(record_type)))
+
+
+def _rows(record_type: type, part: str = '') -> list[str]:
+    """Rows of `table`; each name has the prefix ``part``."""
     defaults = {field.name: field.default for field in dataclasses.fields(record_type)}
-    rows = ['| name | unit | default | bounds | meaning |', '|---|---|---|---|---|']
+    found = []
     for name, meaning in meanings(record_type).items():
         default = '' if defaults[name] is dataclasses.MISSING else f'`{_yaml(defaults[name])}`'
-        rows.append(f'| `{name}` | {meaning.unit} | {default} | {meaning.bounds_text()} | {meaning.description} |')
-    return '\n'.join(rows)
+        bounds = meaning.bounds_text()
+        found.append(f'| `{part}{name}` | {meaning.unit} | {default} | {bounds} | {meaning.description} |')
+    return found
+
+
+def lubrication_case() -> str:
+    """Markdown table of every key of a case of `seal_friction ehl`, as PART.KEY."""
+    return '\n'.join((*HEAD, *(row for part, record in LUBRICATION_PARTS.items() for row in _rows(record, f'{part}.'))))
 
 
 def _yaml(value: object) -> str:
@@ -165,6 +180,7 @@ def filled(text: str) -> str:
     """Text of a page with every table in it made anew."""
     tables = {record_type.__name__: table(record_type) for record_type in RECORDS}
     tables['friction_laws'] = friction_laws()
+    tables['lubrication_case'] = lubrication_case()
     tables['machine_inputs'] = machine_inputs()
     tables |= {'signal_faults': signal_faults(), 'other_faults': other_faults()}
     return re.sub(

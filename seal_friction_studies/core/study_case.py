@@ -40,8 +40,8 @@ class StudySeal(SealBody):
     body: str = parameter(
         'half_plane',
         unit='',
-        description='half_plane: the kernel of a half-plane, zero at the section height. bonded_layer: an '
-        'incompressible layer of that height, bonded to a rigid base. finite_elements: a crowned section of it.',
+        description='half_plane: held at the section height. bonded_layer: incompressible, that high, on a rigid base. '
+        'finite_elements: a crowned section.',
     )
 
 
@@ -91,7 +91,7 @@ class StudyNumerics(LubricationNumerics):
     time_step: float = parameter(5e-4, unit='s', lower=1e-7, upper=0.1, description='Before any halving.')
     steps_at_once: int = parameter(
         1, unit='1', lower=1, upper=16,
-        description='So many time steps in one, while no loaded part of the seal is on the rounding of a control edge.',
+        description='Time steps in one, while no loaded part of the seal is on the rounding of a control edge.',
     )  # fmt: skip
 
 

@@ -25,8 +25,7 @@ class Grease(CheckedParameters):
         unit='1/s',
         lower=1e-3,
         upper=1e6,
-        description='The grease is never taken as stiffer than at this shear rate (our choice: 0.15 % of the rate at '
-        '34 mm/s across 0.5 um, so it acts on films at rest only).',
+        description='The grease is never stiffer than at this shear rate (our choice; acts on films at rest only).',
     )
 
     @property

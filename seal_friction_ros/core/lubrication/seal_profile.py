@@ -47,8 +47,8 @@ class SealBody(CheckedParameters):
     section_hold: str = parameter(
         'bottom',
         unit='',
-        description='What the groove holds; for finite_elements. bottom: it sticks, the flanks are free. '
-        'bottom_and_flanks: the flanks do not move along the axis either. sliding_bottom: the bottom slides freely.',
+        description='What the groove holds, for finite_elements. bottom: it sticks. bottom_and_flanks: the flanks do '
+        'not move along the axis either. sliding_bottom: the bottom slides freely.',
     )
     mooney_c10: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e9, description='C_10.')
     mooney_c01: float = parameter(1.785e6, unit='Pa', lower=0.0, upper=1e9, description='C_01.')
