@@ -7,6 +7,7 @@ import dataclasses
 import inspect
 import re
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS, MachineOptions
@@ -73,12 +74,6 @@ RECORDS = (
     TermCovariance,
     PressureAsymmetry,
     Uncertainty,
-    Groove,
-    Rubber,
-    OringNumerics,
-    OringCase,
-    ShearLaw,
-    MeasuredFriction,
     SavitzkyGolay,
     Sliding,
     SpoolEvaluation,
@@ -99,6 +94,14 @@ LUBRICATION_PARTS = {
     'map': MapGrid,
     'seals[]': SpoolSeal,
 }
+ORING_PARTS = {
+    'groove': Groove,
+    'rubber': Rubber,
+    '': OringCase,
+    'friction.contact_shear': ShearLaw,
+    'measured': MeasuredFriction,
+    'numerics': OringNumerics,
+}
 HEAD = ('| name | unit | default | bounds | meaning |', '|---|---|---|---|---|')
 
 
@@ -108,19 +111,20 @@ def table(record_type: type) -> str:
 
 
 def _rows(record_type: type, part: str = '') -> list[str]:
-    """Rows of `table`; each name has the prefix ``part``."""
+    """Rows of `table`; each name follows that of its part and a dot."""
+    prefix = f'{part}.' if part else ''
     defaults = {field.name: field.default for field in dataclasses.fields(record_type)}
     found = []
     for name, meaning in meanings(record_type).items():
         default = '' if defaults[name] is dataclasses.MISSING else f'`{_yaml(defaults[name])}`'
         bounds = meaning.bounds_text()
-        found.append(f'| `{part}{name}` | {meaning.unit} | {default} | {bounds} | {meaning.description} |')
+        found.append(f'| `{prefix}{name}` | {meaning.unit} | {default} | {bounds} | {meaning.description} |')
     return found
 
 
-def lubrication_case() -> str:
-    """Markdown table of every key of a case of `seal_friction ehl`, as PART.KEY."""
-    return '\n'.join((*HEAD, *(row for part, record in LUBRICATION_PARTS.items() for row in _rows(record, f'{part}.'))))
+def case_table(parts: Mapping[str, type]) -> str:
+    """Markdown table of every key of a case file, as PART.KEY."""
+    return '\n'.join((*HEAD, *(row for part, record in parts.items() for row in _rows(record, part))))
 
 
 def _yaml(value: object) -> str:
@@ -180,7 +184,7 @@ def filled(text: str) -> str:
     """Text of a page with every table in it made anew."""
     tables = {record_type.__name__: table(record_type) for record_type in RECORDS}
     tables['friction_laws'] = friction_laws()
-    tables['lubrication_case'] = lubrication_case()
+    tables |= {'lubrication_case': case_table(LUBRICATION_PARTS), 'oring_case': case_table(ORING_PARTS)}
     tables['machine_inputs'] = machine_inputs()
     tables |= {'signal_faults': signal_faults(), 'other_faults': other_faults()}
     return re.sub(
