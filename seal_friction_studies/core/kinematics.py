@@ -35,12 +35,14 @@ class ConstantAcceleration(ReferenceMotion):
         ValueError: A value is out of bounds, or the speed is not reached within the distance.
     """
 
-    distance: float = parameter(1.8e-3, unit='m', lower=1e-6, upper=10.0, description='Way from end to end, s_max.')
+    distance: float = parameter(
+        1.8e-3, unit='m', lower=1e-6, upper=10.0, description='Distance from end to end, s_max.'
+    )
     acceleration: float = parameter(
         0.68, unit='m/s2', lower=1e-4, upper=1e5, description='Magnitude at both ends, a_const.'
     )
     cycles: int = parameter(2, unit='1', lower=1, upper=1000, description='Number of cycles; the last is evaluated.')
-    centre: float = parameter(0.0, unit='m', lower=-10.0, upper=10.0, description='Middle of the way.')
+    centre: float = parameter(0.0, unit='m', lower=-10.0, upper=10.0, description='Middle of the stroke.')
 
     def __post_init__(self) -> None:
         super().__post_init__()
