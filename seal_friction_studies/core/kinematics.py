@@ -35,9 +35,7 @@ class ConstantAcceleration(ReferenceMotion):
         ValueError: A value is out of bounds, or the speed is not reached within the distance.
     """
 
-    distance: float = parameter(
-        1.8e-3, unit='m', lower=1e-6, upper=10.0, description='Distance from end to end, s_max.'
-    )
+    distance: float = parameter(1.8e-3, unit='m', lower=1e-6, upper=10.0, description='Stroke, end to end, s_max.')
     acceleration: float = parameter(
         0.68, unit='m/s2', lower=1e-4, upper=1e5, description='Magnitude at both ends, a_const.'
     )
