@@ -148,6 +148,15 @@ def test_every_slow_command_of_the_readme_runs(workspace: Path):
     check_commands(chosen, workspace)
 
 
+def test_the_recipe_for_ci_passes_with_the_seal_of_the_bag_and_fails_with_another(checkout: Path):
+    *before, compare = commands(' ci', (ROOT / 'docs' / 'recording.md').read_text())
+    for command in (*before, compare):
+        assert run(command, checkout).returncode == 0, command
+    _, other = (one.replace('ms28775_114.', 'ms28775_114_table.').replace('/ci', '/other') for one in before)
+    assert run(other, checkout).returncode == 0
+    assert run(compare.replace('/ci', '/other'), checkout).returncode == 1
+
+
 def test_the_command_that_proposes_the_next_readings_runs(checkout: Path):
     page = (ROOT / 'docs' / 'identification.md').read_text()
     (command,) = (line for line in commands('', page) if ' --next ' in line)

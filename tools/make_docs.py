@@ -3,14 +3,16 @@
 Each stands between ``<!-- table: NAME -->`` and ``<!-- end -->``.
 """
 
+import argparse
 import dataclasses
 import inspect
 import re
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
-from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS, MachineOptions
-from seal_friction_ros.core.foundation.parameters import meanings
+from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS
+from seal_friction_ros.core.foundation.parameters import Meaning, ParameterGroup, meanings
 from seal_friction_ros.core.foundation.units import QUANTITIES
 from seal_friction_ros.core.friction.actuator import Uncertainty
 from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
@@ -33,6 +35,7 @@ from seal_friction_ros.core.oring_contact.oring_case import Groove, OringCase, O
 from seal_friction_ros.core.oring_contact.oring_case_file import MeasuredFriction
 from seal_friction_ros.core.servo.simulator_options import SERVO_SIMULATOR_PARAMETERS
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, TuningSettings
+from seal_friction_ros.offline.commands.main import make_parser
 from seal_friction_studies.core.groove import GrooveSpring
 from seal_friction_studies.core.kinematics import ConstantAcceleration
 from seal_friction_studies.core.spool_evaluation import SpoolEvaluation
@@ -56,8 +59,6 @@ from seal_friction_ros.core.friction.term_covariance import TermCovariance
 
 DOCS = Path(__file__).parents[1] / 'docs'
 RECORDS = (
-    *(group.record_type for group in (*FRICTION_ESTIMATOR_PARAMETERS, *SERVO_SIMULATOR_PARAMETERS)),
-    MachineOptions,
     TuningSettings,
     RecordedAxisSettings,
     SealGeometry,
@@ -106,6 +107,78 @@ def table(record_type: type) -> str:
         default = '' if defaults[name] is dataclasses.MISSING else f'`{_yaml(defaults[name])}`'
         rows.append(f'| `{name}` | {meaning.unit} | {default} | {meaning.bounds_text()} | {meaning.description} |')
     return '\n'.join(rows)
+
+
+OF_ESTIMATOR = {group.record_type for group in FRICTION_ESTIMATOR_PARAMETERS}
+NODES = {
+    'friction_estimator': FRICTION_ESTIMATOR_PARAMETERS,
+    'servo_simulator': [group for group in SERVO_SIMULATOR_PARAMETERS if group.record_type not in OF_ESTIMATOR],
+}
+"""Parameters of each node, those of both at the first."""
+
+
+def node_parameters(groups: Iterable[ParameterGroup], *, ranges: bool) -> str:
+    """Markdown table of the parameters of a node; a dagger: fixed while the node is configured."""
+    rows = [f'| parameter | default{", range" if ranges else ""} | meaning |', '|---|---|---|']
+    for group in groups:
+        described, fixed = meanings(group.record_type), group.fixed()
+        for name, field in group.names().items():
+            meaning, default = described[field], group.record_type.__dataclass_fields__[field].default
+            words = [_short(default), meaning.unit.removeprefix('1'), _range(meaning) if ranges else '']
+            mark = '†' if name in fixed else ''
+            rows.append(f'| `{name}`{mark} | {" ".join(filter(None, words))} | {meaning.description} |')
+    return '\n'.join(rows)
+
+
+def _range(meaning: Meaning) -> str:
+    return '' if meaning.lower is None else f'({meaning.lower:g}…{meaning.upper:g})'
+
+
+def _short(value: object) -> str:
+    return f'{value:g}' if isinstance(value, float) else _yaml(value)
+
+
+PAGES_OF_COMMANDS = {
+    'adapt': 'estimation.md#commands',
+    'bag': 'machines.md',
+    'compare': 'recording.md#replay-in-ci',
+    'doctor': 'installation.md',
+    'ehl': 'ehl.md',
+    'fleet': 'scale.md#a-page-over-many-bags',
+    'health': 'estimation.md#commands',
+    'identify': 'identification.md',
+    'log': 'rig_files.md',
+    'monitor': 'monitor.md',
+    'oring': 'oring.md',
+    'policy': 'security.md',
+    'recover': 'recording.md#recover',
+    'replay': 'performance.md#replay',
+    'report': '#pages',
+    'rig': 'rig_files.md',
+    'robot': 'first_hour.md#2-write-the-mapping-file',
+    'sheet': 'identification.md#what-to-measure',
+    'tune': 'tuning.md',
+}
+"""Page that says more about a command or a kind of it."""
+
+
+def commands() -> str:
+    """Markdown table of every command, with its kinds, as ``--help`` says it."""
+    rows = ['| command | does |', '|---|---|']
+    for name, parser in _subparsers(make_parser()).items():
+        kinds = ', '.join(map(_linked, _subparsers(parser)))
+        rows.append(f'| {_linked(name)} | {parser.description}{kinds and f" ({kinds})"} |')
+    return '\n'.join(rows)
+
+
+def _linked(name: str) -> str:
+    page = PAGES_OF_COMMANDS.get(name)
+    return f'[`{name}`]({page})' if page else f'`{name}`'
+
+
+def _subparsers(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    actions = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
+    return {name: kind for action in actions for name, kind in action.choices.items()}
 
 
 def _yaml(value: object) -> str:
@@ -166,6 +239,8 @@ def filled(text: str) -> str:
     tables = {record_type.__name__: table(record_type) for record_type in RECORDS}
     tables['friction_laws'] = friction_laws()
     tables['machine_inputs'] = machine_inputs()
+    tables['commands'] = commands()
+    tables |= {node: node_parameters(groups, ranges=node != 'servo_simulator') for node, groups in NODES.items()}
     tables |= {'signal_faults': signal_faults(), 'other_faults': other_faults()}
     return re.sub(
         r'<!-- table: (\w+) -->\n.*?<!-- end -->',
