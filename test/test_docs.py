@@ -9,6 +9,7 @@ import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import demo
 import make_docs
@@ -17,8 +18,10 @@ import yaml
 from harness.processes import free_domain, graph_environment
 from harness.spin_nodes import SpunNodes, ros_context
 from paths import ROOT
+from rclpy.duration import Duration
 from rclpy.node import Node
 from seal_friction_msgs.msg import FrictionFeedForward
+from std_msgs.msg import Header
 
 from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS
 from seal_friction_ros.core.messages.layouts import INPUTS
@@ -191,6 +194,43 @@ def test_the_servo_on_the_desk_runs_as_the_readme_says_and_gets_its_feed_forward
     verdict = replay(bag)
     assert verdict.identical
     assert verdict.recorded_feedforwards > 500
+
+
+def test_the_subscriber_for_controllers_takes_a_fresh_force_and_0_n_after_50_ms():
+    (code,) = re.findall(r'```python\n(.*?)```', (ROOT / 'docs' / 'controllers.md').read_text(), re.DOTALL)
+    page: dict[str, Any] = {}
+    exec(code, page)  # noqa: S102  our own page
+    with ros_context() as context:
+        nodes = controller, sender = (Node('controller', context=context), Node('sender', context=context))
+        taken: list[FrictionFeedForward] = []
+        feedforward = page['FeedForward'](controller)
+        controller.create_subscription(FrictionFeedForward, 'friction_feedforward', taken.append, 10)
+        publisher = sender.create_publisher(FrictionFeedForward, 'friction_feedforward', 10)
+        spun = SpunNodes(context, *nodes)
+        spun.connect()
+
+        def send(force: float, age: float) -> int:
+            stamp = sender.get_clock().now() - Duration(seconds=age)
+            publisher.publish(FrictionFeedForward(header=Header(stamp=stamp.to_msg()), force=force))
+            return stamp.nanoseconds
+
+        def is_taken() -> bool:
+            send(12.0, 0.0)
+            return spun.spin_until(lambda: feedforward.force() == 12.0, 0.02)
+
+        assert feedforward.force() == 0.0
+        wait_until(is_taken)
+        last = send(12.0, 0.0)
+        wait_until(lambda: spun.spin_until(lambda: feedforward.force() == 0.0, 0.02))
+        assert sender.get_clock().now().nanoseconds - last > page['OLDEST']
+        for late in (0.06, -0.1):
+            for _ in range(5):
+                send(7.0, late)
+            count = len(taken)
+            assert spun.spin_until(lambda before=count: len(taken) >= before + 5)
+            assert feedforward.force() == 0.0
+        for node in nodes:
+            node.destroy_node()
 
 
 def test_the_commands_of_the_live_view_print_an_address_that_answers(checkout: Path):
