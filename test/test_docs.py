@@ -287,6 +287,11 @@ def test_tables_are_those_of_the_code(page: Path):
     assert make_docs.filled(page.read_text()) == page.read_text()
 
 
+def test_the_parameter_file_of_the_simulator_lists_those_of_the_code():
+    text = make_docs.SIMULATOR_FILE.read_text()
+    assert make_docs.filled_parameter_file(text) == text
+
+
 @pytest.mark.parametrize('page', [*PAGES, ROOT / 'CHANGELOG.rst'], ids=lambda page: page.name)
 def test_parameters_with_a_prefix_exist(page: Path):
     groups = (*FRICTION_ESTIMATOR_PARAMETERS, *SERVO_SIMULATOR_PARAMETERS)

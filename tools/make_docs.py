@@ -8,7 +8,7 @@ import dataclasses
 import inspect
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS
@@ -58,6 +58,7 @@ from seal_friction_ros.core.friction.temperature import TemperatureScale
 from seal_friction_ros.core.friction.term_covariance import TermCovariance
 
 DOCS = Path(__file__).parents[1] / 'docs'
+SIMULATOR_FILE = DOCS.parent / 'config' / 'servo_simulator.yaml'
 RECORDS = (
     TuningSettings,
     RecordedAxisSettings,
@@ -109,33 +110,37 @@ def table(record_type: type) -> str:
     return '\n'.join(rows)
 
 
-OF_ESTIMATOR = {group.record_type for group in FRICTION_ESTIMATOR_PARAMETERS}
-NODES = {
-    'friction_estimator': FRICTION_ESTIMATOR_PARAMETERS,
-    'servo_simulator': [group for group in SERVO_SIMULATOR_PARAMETERS if group.record_type not in OF_ESTIMATOR],
-}
-"""Parameters of each node, those of both at the first."""
-
-
-def node_parameters(groups: Iterable[ParameterGroup], *, ranges: bool) -> str:
+def node_parameters(groups: Iterable[ParameterGroup]) -> str:
     """Markdown table of the parameters of a node; a dagger: fixed while the node is configured."""
-    rows = [f'| parameter | default{", range" if ranges else ""} | meaning |', '|---|---|---|']
-    for group in groups:
-        described, fixed = meanings(group.record_type), group.fixed()
-        for name, field in group.names().items():
-            meaning, default = described[field], group.record_type.__dataclass_fields__[field].default
-            words = [_short(default), meaning.unit.removeprefix('1'), _range(meaning) if ranges else '']
-            mark = '†' if name in fixed else ''
-            rows.append(f'| `{name}`{mark} | {" ".join(filter(None, words))} | {meaning.description} |')
+    rows = ['| parameter | default, range | meaning |', '|---|---|---|']
+    for name, default, meaning, is_fixed in _parameters(groups):
+        words = [f'{default:g}' if isinstance(default, float) else _yaml(default), *_unit_and_range(meaning, '{}')]
+        rows.append(f'| `{name}`{"†" if is_fixed else ""} | {" ".join(words)} | {meaning.description} |')
     return '\n'.join(rows)
 
 
-def _range(meaning: Meaning) -> str:
-    return '' if meaning.lower is None else f'({meaning.lower:g}…{meaning.upper:g})'
+def parameter_comments(groups: Iterable[ParameterGroup]) -> str:
+    """Lines of comment for a parameter file: each parameter with default, unit, range and meaning."""
+    lines = []
+    for name, default, meaning, is_fixed in _parameters(groups):
+        words = [*_unit_and_range(meaning, '[{}]'), *['fixed.'] * is_fixed, meaning.description]
+        lines.append(f'# {name}: {_yaml(default)}  # {" ".join(words)}\n')
+    return ''.join(lines)
 
 
-def _short(value: object) -> str:
-    return f'{value:g}' if isinstance(value, float) else _yaml(value)
+def _parameters(groups: Iterable[ParameterGroup]) -> Iterator[tuple[str, object, Meaning, bool]]:
+    """Name, default and meaning of each parameter, and whether it is fixed while the node is configured."""
+    for group in groups:
+        described, fixed = meanings(group.record_type), group.fixed()
+        for name, field in group.names().items():
+            default = group.record_type.__dataclass_fields__[field].default
+            yield name, default, described[field], name in fixed
+
+
+def _unit_and_range(meaning: Meaning, form: str) -> list[str]:
+    unit = '' if meaning.unit in ('', '1') else form.format(meaning.unit)
+    within = '' if meaning.lower is None else f'({meaning.lower:g}…{meaning.upper:g})'
+    return [word for word in (unit, within) if word]
 
 
 PAGES_OF_COMMANDS = {
@@ -240,7 +245,7 @@ def filled(text: str) -> str:
     tables['friction_laws'] = friction_laws()
     tables['machine_inputs'] = machine_inputs()
     tables['commands'] = commands()
-    tables |= {node: node_parameters(groups, ranges=node != 'servo_simulator') for node, groups in NODES.items()}
+    tables['friction_estimator'] = node_parameters(FRICTION_ESTIMATOR_PARAMETERS)
     tables |= {'signal_faults': signal_faults(), 'other_faults': other_faults()}
     return re.sub(
         r'<!-- table: (\w+) -->\n.*?<!-- end -->',
@@ -250,10 +255,18 @@ def filled(text: str) -> str:
     )
 
 
+def filled_parameter_file(text: str) -> str:
+    """Text of the parameter file of ``servo_simulator`` with its list of all parameters made anew."""
+    mark = '# Every parameter'
+    before, _, after = text.partition(mark)
+    return before + mark + after.partition('\n')[0] + '\n' + parameter_comments(SERVO_SIMULATOR_PARAMETERS)
+
+
 def main() -> int:
-    """Write every page."""
+    """Write every page, and the parameter file."""
     for page in sorted(DOCS.glob('*.md')):
         page.write_text(filled(page.read_text()))
+    SIMULATOR_FILE.write_text(filled_parameter_file(SIMULATOR_FILE.read_text()))
     return 0
 
 
