@@ -9,6 +9,7 @@ import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import demo
 import make_docs
@@ -17,8 +18,10 @@ import yaml
 from harness.processes import free_domain, graph_environment
 from harness.spin_nodes import SpunNodes, ros_context
 from paths import ROOT
+from rclpy.duration import Duration
 from rclpy.node import Node
 from seal_friction_msgs.msg import FrictionFeedForward
+from std_msgs.msg import Header
 
 from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS
 from seal_friction_ros.core.messages.layouts import INPUTS
@@ -148,6 +151,15 @@ def test_every_slow_command_of_the_readme_runs(workspace: Path):
     check_commands(chosen, workspace)
 
 
+def test_the_recipe_for_ci_passes_with_the_seal_of_the_bag_and_fails_with_another(checkout: Path):
+    *before, compare = commands(' ci', (ROOT / 'docs' / 'recording.md').read_text())
+    for command in (*before, compare):
+        assert run(command, checkout).returncode == 0, command
+    _, other = (one.replace('ms28775_114.', 'ms28775_114_table.').replace('/ci', '/other') for one in before)
+    assert run(other, checkout).returncode == 0
+    assert run(compare.replace('/ci', '/other'), checkout).returncode == 1
+
+
 def test_the_command_that_proposes_the_next_readings_runs(checkout: Path):
     page = (ROOT / 'docs' / 'identification.md').read_text()
     (command,) = (line for line in commands('', page) if ' --next ' in line)
@@ -182,6 +194,43 @@ def test_the_servo_on_the_desk_runs_as_the_readme_says_and_gets_its_feed_forward
     verdict = replay(bag)
     assert verdict.identical
     assert verdict.recorded_feedforwards > 500
+
+
+def test_the_subscriber_for_controllers_takes_a_fresh_force_and_0_n_after_50_ms():
+    (code,) = re.findall(r'```python\n(.*?)```', (ROOT / 'docs' / 'controllers.md').read_text(), re.DOTALL)
+    page: dict[str, Any] = {}
+    exec(code, page)  # noqa: S102  our own page
+    with ros_context() as context:
+        nodes = controller, sender = (Node('controller', context=context), Node('sender', context=context))
+        taken: list[FrictionFeedForward] = []
+        feedforward = page['FeedForward'](controller)
+        controller.create_subscription(FrictionFeedForward, 'friction_feedforward', taken.append, 10)
+        publisher = sender.create_publisher(FrictionFeedForward, 'friction_feedforward', 10)
+        spun = SpunNodes(context, *nodes)
+        spun.connect()
+
+        def send(force: float, age: float) -> int:
+            stamp = sender.get_clock().now() - Duration(seconds=age)
+            publisher.publish(FrictionFeedForward(header=Header(stamp=stamp.to_msg()), force=force))
+            return stamp.nanoseconds
+
+        def is_taken() -> bool:
+            send(12.0, 0.0)
+            return spun.spin_until(lambda: feedforward.force() == 12.0, 0.02)
+
+        assert feedforward.force() == 0.0
+        wait_until(is_taken)
+        last = send(12.0, 0.0)
+        wait_until(lambda: spun.spin_until(lambda: feedforward.force() == 0.0, 0.02))
+        assert sender.get_clock().now().nanoseconds - last > page['OLDEST']
+        for late in (0.06, -0.1):
+            for _ in range(5):
+                send(7.0, late)
+            count = len(taken)
+            assert spun.spin_until(lambda before=count: len(taken) >= before + 5)
+            assert feedforward.force() == 0.0
+        for node in nodes:
+            node.destroy_node()
 
 
 def test_the_commands_of_the_live_view_print_an_address_that_answers(checkout: Path):
@@ -236,6 +285,11 @@ def test_services_named_in_the_readme_are_those_of_the_node():
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
 def test_tables_are_those_of_the_code(page: Path):
     assert make_docs.filled(page.read_text()) == page.read_text()
+
+
+def test_the_parameter_file_of_the_simulator_lists_those_of_the_code():
+    text = make_docs.SIMULATOR_FILE.read_text()
+    assert make_docs.filled_parameter_file(text) == text
 
 
 @pytest.mark.parametrize('page', [*PAGES, ROOT / 'CHANGELOG.rst'], ids=lambda page: page.name)

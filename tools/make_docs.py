@@ -3,15 +3,16 @@
 Each stands between ``<!-- table: NAME -->`` and ``<!-- end -->``.
 """
 
+import argparse
 import dataclasses
 import inspect
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS, MachineOptions
-from seal_friction_ros.core.foundation.parameters import meanings
+from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS
+from seal_friction_ros.core.foundation.parameters import Meaning, ParameterGroup, meanings
 from seal_friction_ros.core.foundation.units import QUANTITIES
 from seal_friction_ros.core.friction.actuator import Uncertainty
 from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
@@ -34,6 +35,7 @@ from seal_friction_ros.core.oring_contact.oring_case import Groove, OringCase, O
 from seal_friction_ros.core.oring_contact.oring_case_file import MeasuredFriction
 from seal_friction_ros.core.servo.simulator_options import SERVO_SIMULATOR_PARAMETERS
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, TuningSettings
+from seal_friction_ros.offline.commands.main import make_parser
 from seal_friction_studies.core.groove import GrooveSpring
 from seal_friction_studies.core.kinematics import ConstantAcceleration
 from seal_friction_studies.core.spool_evaluation import SpoolEvaluation
@@ -56,9 +58,8 @@ from seal_friction_ros.core.friction.temperature import TemperatureScale
 from seal_friction_ros.core.friction.term_covariance import TermCovariance
 
 DOCS = Path(__file__).parents[1] / 'docs'
+SIMULATOR_FILE = DOCS.parent / 'config' / 'servo_simulator.yaml'
 RECORDS = (
-    *(group.record_type for group in (*FRICTION_ESTIMATOR_PARAMETERS, *SERVO_SIMULATOR_PARAMETERS)),
-    MachineOptions,
     TuningSettings,
     RecordedAxisSettings,
     SealGeometry,
@@ -127,6 +128,82 @@ def case_table(parts: Mapping[str, type]) -> str:
     return '\n'.join((*HEAD, *(row for part, record in parts.items() for row in _rows(record, part))))
 
 
+def node_parameters(groups: Iterable[ParameterGroup]) -> str:
+    """Markdown table of the parameters of a node; a dagger: fixed while the node is configured."""
+    rows = ['| parameter | default, range | meaning |', '|---|---|---|']
+    for name, default, meaning, is_fixed in _parameters(groups):
+        words = [f'{default:g}' if isinstance(default, float) else _yaml(default), *_unit_and_range(meaning, '{}')]
+        rows.append(f'| `{name}`{"†" if is_fixed else ""} | {" ".join(words)} | {meaning.description} |')
+    return '\n'.join(rows)
+
+
+def parameter_comments(groups: Iterable[ParameterGroup]) -> str:
+    """Lines of comment for a parameter file: each parameter with default, unit, range and meaning."""
+    lines = []
+    for name, default, meaning, is_fixed in _parameters(groups):
+        words = [*_unit_and_range(meaning, '[{}]'), *['fixed.'] * is_fixed, meaning.description]
+        lines.append(f'# {name}: {_yaml(default)}  # {" ".join(words)}\n')
+    return ''.join(lines)
+
+
+def _parameters(groups: Iterable[ParameterGroup]) -> Iterator[tuple[str, object, Meaning, bool]]:
+    """Name, default and meaning of each parameter, and whether it is fixed while the node is configured."""
+    for group in groups:
+        described, fixed = meanings(group.record_type), group.fixed()
+        for name, field in group.names().items():
+            default = group.record_type.__dataclass_fields__[field].default
+            yield name, default, described[field], name in fixed
+
+
+def _unit_and_range(meaning: Meaning, form: str) -> list[str]:
+    unit = '' if meaning.unit in ('', '1') else form.format(meaning.unit)
+    within = '' if meaning.lower is None else f'({meaning.lower:g}…{meaning.upper:g})'
+    return [word for word in (unit, within) if word]
+
+
+PAGES_OF_COMMANDS = {
+    'adapt': 'estimation.md#commands',
+    'bag': 'machines.md',
+    'compare': 'recording.md#replay-in-ci',
+    'doctor': 'installation.md',
+    'ehl': 'ehl.md',
+    'fleet': 'scale.md#a-page-over-many-bags',
+    'health': 'estimation.md#commands',
+    'identify': 'identification.md',
+    'log': 'rig_files.md',
+    'monitor': 'monitor.md',
+    'oring': 'oring.md',
+    'policy': 'security.md',
+    'recover': 'recording.md#recover',
+    'replay': 'performance.md#replay',
+    'report': '#pages',
+    'rig': 'rig_files.md',
+    'robot': 'first_hour.md#2-write-the-mapping-file',
+    'sheet': 'identification.md#what-to-measure',
+    'tune': 'tuning.md',
+}
+"""Page that says more about a command or a kind of it."""
+
+
+def commands() -> str:
+    """Markdown table of every command, with its kinds, as ``--help`` says it."""
+    rows = ['| command | does |', '|---|---|']
+    for name, parser in _subparsers(make_parser()).items():
+        kinds = ', '.join(map(_linked, _subparsers(parser)))
+        rows.append(f'| {_linked(name)} | {parser.description}{kinds and f" ({kinds})"} |')
+    return '\n'.join(rows)
+
+
+def _linked(name: str) -> str:
+    page = PAGES_OF_COMMANDS.get(name)
+    return f'[`{name}`]({page})' if page else f'`{name}`'
+
+
+def _subparsers(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    actions = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
+    return {name: kind for action in actions for name, kind in action.choices.items()}
+
+
 def _yaml(value: object) -> str:
     if isinstance(value, tuple):
         return f'[{", ".join(_yaml(item) for item in value)}]'
@@ -186,6 +263,8 @@ def filled(text: str) -> str:
     tables['friction_laws'] = friction_laws()
     tables |= {'lubrication_case': case_table(LUBRICATION_PARTS), 'oring_case': case_table(ORING_PARTS)}
     tables['machine_inputs'] = machine_inputs()
+    tables['commands'] = commands()
+    tables['friction_estimator'] = node_parameters(FRICTION_ESTIMATOR_PARAMETERS)
     tables |= {'signal_faults': signal_faults(), 'other_faults': other_faults()}
     return re.sub(
         r'<!-- table: (\w+) -->\n.*?<!-- end -->',
@@ -195,10 +274,18 @@ def filled(text: str) -> str:
     )
 
 
+def filled_parameter_file(text: str) -> str:
+    """Text of the parameter file of ``servo_simulator`` with its list of all parameters made anew."""
+    mark = '# Every parameter'
+    before, _, after = text.partition(mark)
+    return before + mark + after.partition('\n')[0] + '\n' + parameter_comments(SERVO_SIMULATOR_PARAMETERS)
+
+
 def main() -> int:
-    """Write every page."""
+    """Write every page, and the parameter file."""
     for page in sorted(DOCS.glob('*.md')):
         page.write_text(filled(page.read_text()))
+    SIMULATOR_FILE.write_text(filled_parameter_file(SIMULATOR_FILE.read_text()))
     return 0
 
 

@@ -14,16 +14,19 @@ from seal_friction_ros.core.estimation.node_options import (
 )
 from seal_friction_ros.core.servo.simulator_options import SERVO_SIMULATOR_PARAMETERS
 
-TABLES = {'friction_estimator': FRICTION_ESTIMATOR_PARAMETERS, 'servo_simulator': SERVO_SIMULATOR_PARAMETERS}
+NODES = [
+    (FRICTION_ESTIMATOR_PARAMETERS, 'docs/interfaces.md', '| `{}`'),
+    (SERVO_SIMULATOR_PARAMETERS, 'config/servo_simulator.yaml', '# {}: '),
+]
+"""Parameters of a node, where they are listed, and how a row begins."""
 
 
-@pytest.mark.parametrize('node', TABLES)
-def test_every_parameter_belongs_to_one_group_and_every_group_is_documented(node: str):
-    names = [name for group in TABLES[node] for name in group.names()]
+@pytest.mark.parametrize(('groups', 'file', 'row'), NODES, ids=['friction_estimator', 'servo_simulator'])
+def test_every_parameter_belongs_to_one_group_and_is_listed(groups, file: str, row: str):
+    names = [name for group in groups for name in group.names()]
     assert len(names) == len(set(names))
-    page = (ROOT / 'docs' / 'interfaces.md').read_text()
-    missing = [g.record_type.__name__ for g in TABLES[node] if f'<!-- table: {g.record_type.__name__} -->' not in page]
-    assert not missing
+    text = (ROOT / file).read_text()
+    assert [name for name in names if row.format(name) not in text] == []
 
 
 def test_the_feed_forward_has_a_prefix_and_seals_are_fixed():
