@@ -7,6 +7,8 @@ import dataclasses
 import inspect
 import re
 import sys
+from collections.abc import Iterable
+from itertools import takewhile
 from pathlib import Path
 
 from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS, MachineOptions
@@ -130,28 +132,41 @@ def friction_laws() -> str:
 
 
 _FEEDFORWARD = {
-    'fades': 'fades to 0 within `feedforward.fade_time`',
+    'fades': 'fades to 0',
     'dips': 'fades for that sample',
 }
 
 
 def signal_faults() -> str:
-    """Markdown table of the faults of a signal, those with the same consequences in one row."""
-    rows = ['| fault | estimate | feed-forward | status | diagnostics | back to normal |', '|---|---|---|---|---|---|']
-    alike: dict[tuple[str, ...], list[Row]] = {}
-    for row in SIGNAL_ROWS:
-        bits = ', '.join(f'`{bit}`' for bit in row.status.split()) if row.status != 'any' else 'one for each'
-        force = _FEEDFORWARD.get(row.feedforward, row.feedforward)
-        alike.setdefault((row.estimate, force, bits, row.level, row.recovery), []).append(row)
-    for consequences, faults in alike.items():
-        rows.append(f'| {"; ".join(row.fault for row in faults)} | {" | ".join(consequences)} |')
-    return '\n'.join(rows)
+    """Markdown table of the faults of a signal."""
+    columns = ('fault', 'estimate', 'feed-forward', 'status')
+    return _faults(columns, (_signal_row(row) for row in SIGNAL_ROWS))
+
+
+def _signal_row(row: Row) -> tuple[str, ...]:
+    bits = ', '.join(f'`{bit}`' for bit in row.status.split()) if row.status != 'any' else 'one for each'
+    return row.fault, row.estimate, _FEEDFORWARD.get(row.feedforward, row.feedforward), bits
 
 
 def other_faults() -> str:
     """Markdown table of the faults of graph, process and disk."""
-    rows = [f'| {" | ".join((trial.fault, *trial.required))} |' for trial in TRIALS]
-    return '\n'.join([f'| fault | {" | ".join(REQUIRED)} |', '|---' * 5 + '|', *rows])
+    return _faults(('fault', *REQUIRED), ((trial.fault, *trial.required) for trial in TRIALS))
+
+
+def _faults(columns: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    """Markdown table; faults with the same consequences are in one row."""
+    alike: dict[tuple[str, ...], list[str]] = {}
+    for fault, *consequences in rows:
+        alike.setdefault(tuple(consequences), []).append(fault)
+    lines = [f'| {_named(faults)} | {" | ".join(consequences)} |' for consequences, faults in alike.items()]
+    return '\n'.join([f'| {" | ".join(columns)} |', '|---' * len(columns) + '|', *lines])
+
+
+def _named(faults: list[str]) -> str:
+    """Names of faults; the words with which all begin are said once."""
+    alike = takewhile(lambda words: len(set(words)) == 1, zip(*(fault.split() for fault in faults), strict=False))
+    start = ' '.join(words[0] for words in alike)
+    return '; '.join([faults[0], *(fault.removeprefix(start).strip() for fault in faults[1:])])
 
 
 def machine_inputs() -> str:
