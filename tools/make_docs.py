@@ -37,7 +37,6 @@ from seal_friction_ros.core.servo.simulator_options import SERVO_SIMULATOR_PARAM
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, TuningSettings
 from seal_friction_studies.core.groove import GrooveSpring
 from seal_friction_studies.core.kinematics import ConstantAcceleration
-from seal_friction_studies.core.spool_evaluation import SpoolEvaluation
 from seal_friction_studies.core.study_case import (
     AirPressure,
     ShearStressStudy,
@@ -96,7 +95,6 @@ RECORDS = (
     SpoolSeal,
     SavitzkyGolay,
     Sliding,
-    SpoolEvaluation,
 )
 
 
