@@ -34,7 +34,6 @@ from seal_friction_ros.core.oring_contact.material import Rubber
 from seal_friction_ros.core.oring_contact.oring_case import Groove, OringCase, OringNumerics
 from seal_friction_ros.core.oring_contact.oring_case_file import MeasuredFriction
 from seal_friction_ros.core.servo.simulator_options import SERVO_SIMULATOR_PARAMETERS
-from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, TuningSettings
 from seal_friction_studies.core.groove import GrooveSpring
 from seal_friction_studies.core.kinematics import ConstantAcceleration
 from seal_friction_studies.core.study_case import (
@@ -59,8 +58,6 @@ DOCS = Path(__file__).parents[1] / 'docs'
 RECORDS = (
     *(group.record_type for group in (*FRICTION_ESTIMATOR_PARAMETERS, *SERVO_SIMULATOR_PARAMETERS)),
     MachineOptions,
-    TuningSettings,
-    RecordedAxisSettings,
     SealGeometry,
     AreaDeformationGain,
     NormalForceTable,
