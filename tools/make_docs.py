@@ -55,9 +55,7 @@ from seal_friction_ros.core.friction.temperature import TemperatureScale
 from seal_friction_ros.core.friction.term_covariance import TermCovariance
 
 DOCS = Path(__file__).parents[1] / 'docs'
-RECORDS = (
-    *(group.record_type for group in (*FRICTION_ESTIMATOR_PARAMETERS, *SERVO_SIMULATOR_PARAMETERS)),
-    MachineOptions,
+SEAL_PARTS = (
     SealGeometry,
     AreaDeformationGain,
     NormalForceTable,
@@ -71,6 +69,12 @@ RECORDS = (
     TermCovariance,
     PressureAsymmetry,
     Uncertainty,
+)
+"""Parts of a seal file, with short tables: a number out of bounds is an error that names the bound."""
+
+RECORDS = (
+    *(group.record_type for group in (*FRICTION_ESTIMATOR_PARAMETERS, *SERVO_SIMULATOR_PARAMETERS)),
+    MachineOptions,
     Groove,
     Rubber,
     OringNumerics,
@@ -97,12 +101,26 @@ RECORDS = (
 
 def table(record_type: type) -> str:
     """Markdown table of the described fields of a dataclass."""
-    defaults = {field.name: field.default for field in dataclasses.fields(record_type)}
     rows = ['| name | unit | default | bounds | meaning |', '|---|---|---|---|---|']
     for name, meaning in meanings(record_type).items():
-        default = '' if defaults[name] is dataclasses.MISSING else f'`{_yaml(defaults[name])}`'
+        default = _default(record_type, name)
         rows.append(f'| `{name}` | {meaning.unit} | {default} | {meaning.bounds_text()} | {meaning.description} |')
     return '\n'.join(rows)
+
+
+def short_table(record_type: type) -> str:
+    """Markdown table of the keys of a part of a seal file, without bounds."""
+    rows = ['| key | unit | meaning |', '|---|---|---|']
+    for name, meaning in meanings(record_type).items():
+        default = _default(record_type, name)
+        text = f'{meaning.description} Default {default}.' if default else meaning.description
+        rows.append(f'| `{name}` | {meaning.unit} | {text} |')
+    return '\n'.join(rows)
+
+
+def _default(record_type: type, name: str) -> str:
+    default = {field.name: field.default for field in dataclasses.fields(record_type)}[name]
+    return '' if default is dataclasses.MISSING else f'`{_yaml(default)}`'
 
 
 def _yaml(value: object) -> str:
@@ -114,16 +132,22 @@ def _yaml(value: object) -> str:
 
 
 def friction_laws() -> str:
-    """A section for each law of the registry: name in a seal file, equation, other keys it takes, parameters."""
+    """A section for each law of the registry: name in a seal file, docstring, other keys it takes, parameters."""
     sections = []
     for law in FRICTION_LAWS:
         about = re.split(r'\n\n(?:Raises|ValueError):', inspect.cleandoc(law.__doc__ or ''))[0]
         others = ', '.join(f'`{key}`' for key in sorted(keys_of_law(law) - {law.PART or law.NAME}))
-        text = f'### `coulomb_law: {law.NAME}`\n\nEquation: {law.FORMULA}. {about}'
-        text += f'\n\nIt takes {others} from the seal file.' if others else ''
-        text += f'\n\nParameters, under `{law.PART or law.NAME}`:\n\n{table(law)}' if meanings(law) else ''
+        text = f'### `coulomb_law: {law.NAME}`\n\n{_markdown(about)}'
+        text += f' It takes {others}.' if others else ''
+        text += f'\n\nUnder `{law.PART or law.NAME}`:\n\n{short_table(law)}' if meanings(law) else ''
         sections.append(text)
     return '\n\n'.join(sections)
+
+
+def _markdown(docstring: str) -> str:
+    """Equations and citations of a docstring as Markdown has them."""
+    text = re.sub(r'\.\. math::\s*((?:.+\n?)+)', lambda found: f'$${" ".join(found[1].split())}$$\n', docstring)
+    return text.replace(']_', ']')
 
 
 _FEEDFORWARD = {
@@ -174,6 +198,7 @@ def machine_inputs() -> str:
 def filled(text: str) -> str:
     """Text of a page with every table in it made anew."""
     tables = {record_type.__name__: table(record_type) for record_type in RECORDS}
+    tables |= {record_type.__name__: short_table(record_type) for record_type in SEAL_PARTS}
     tables['friction_laws'] = friction_laws()
     tables['machine_inputs'] = machine_inputs()
     tables |= {'signal_faults': signal_faults(), 'other_faults': other_faults()}
