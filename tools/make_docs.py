@@ -25,7 +25,6 @@ from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.mounting import Mounting
 from seal_friction_ros.core.friction.presliding import Presliding
 from seal_friction_ros.core.friction.pressure_asymmetry import PressureAsymmetry
-from seal_friction_ros.core.identification.signal_preparation import SavitzkyGolay, Sliding
 from seal_friction_ros.core.lubrication.grease import Grease
 from seal_friction_ros.core.lubrication.lubrication_case import MapGrid
 from seal_friction_ros.core.lubrication.topography import Topography
@@ -94,8 +93,6 @@ RECORDS = (
     ShearStressStudy,
     MapGrid,
     SpoolSeal,
-    SavitzkyGolay,
-    Sliding,
 )
 
 
