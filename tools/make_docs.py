@@ -107,11 +107,12 @@ def table(record_type: type) -> str:
 
 def short_table(record_type: type) -> str:
     """Markdown table of the keys of a part of a seal file, without bounds."""
-    rows = ['| key | unit | meaning |', '|---|---|---|']
+    rows = ['| key [unit] | meaning |', '|---|---|']
     for name, meaning in meanings(record_type).items():
         default = _default(record_type, name)
         text = f'{meaning.description} Default {default}.' if default else meaning.description
-        rows.append(f'| `{name}` | {meaning.unit} | {text} |')
+        unit = f' [{meaning.unit}]' if meaning.unit.removeprefix('1') else ''
+        rows.append(f'| `{name}`{unit} | {text} |')
     return '\n'.join(rows)
 
 
