@@ -138,7 +138,7 @@ LAST = 'with the last valid {}'
 
 def _unusable() -> Iterator[Row]:
     """NaN, infinite and out of range for each input, on all ticks."""
-    for words, value in (('NaN', math.nan), ('infinite', math.inf), ('minus infinite', -math.inf), ('1e300', 1e300)):
+    for words, value in (('NaN', math.nan), ('infinite', math.inf), ('-infinite', -math.inf), ('1e300', 1e300)):
         bit = 'OUT_OF_RANGE' if math.isfinite(value) else 'NOT_FINITE'
         yield Row(
             f'pressure {words}',
