@@ -9,6 +9,7 @@ import inspect
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import takewhile
 from pathlib import Path
 
 from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS
@@ -25,7 +26,6 @@ from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.mounting import Mounting
 from seal_friction_ros.core.friction.presliding import Presliding
 from seal_friction_ros.core.friction.pressure_asymmetry import PressureAsymmetry
-from seal_friction_ros.core.identification.signal_preparation import SavitzkyGolay, Sliding
 from seal_friction_ros.core.lubrication.grease import Grease
 from seal_friction_ros.core.lubrication.lubrication_case import MapGrid
 from seal_friction_ros.core.lubrication.topography import Topography
@@ -34,11 +34,9 @@ from seal_friction_ros.core.oring_contact.material import Rubber
 from seal_friction_ros.core.oring_contact.oring_case import Groove, OringCase, OringNumerics
 from seal_friction_ros.core.oring_contact.oring_case_file import MeasuredFriction
 from seal_friction_ros.core.servo.simulator_options import SERVO_SIMULATOR_PARAMETERS
-from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, TuningSettings
 from seal_friction_ros.offline.commands.main import make_parser
 from seal_friction_studies.core.groove import GrooveSpring
 from seal_friction_studies.core.kinematics import ConstantAcceleration
-from seal_friction_studies.core.spool_evaluation import SpoolEvaluation
 from seal_friction_studies.core.study_case import (
     AirPressure,
     ShearStressStudy,
@@ -59,9 +57,7 @@ from seal_friction_ros.core.friction.term_covariance import TermCovariance
 
 DOCS = Path(__file__).parents[1] / 'docs'
 SIMULATOR_FILE = DOCS.parent / 'config' / 'servo_simulator.yaml'
-RECORDS = (
-    TuningSettings,
-    RecordedAxisSettings,
+SEAL_PARTS = (
     SealGeometry,
     AreaDeformationGain,
     NormalForceTable,
@@ -75,10 +71,9 @@ RECORDS = (
     TermCovariance,
     PressureAsymmetry,
     Uncertainty,
-    SavitzkyGolay,
-    Sliding,
-    SpoolEvaluation,
 )
+"""Parts of a seal file, with short tables: a number out of bounds is an error that names the bound."""
+
 
 LUBRICATION_PARTS = {
     'seal': StudySeal,
@@ -106,18 +101,12 @@ ORING_PARTS = {
 HEAD = ('| name | unit | default | bounds | meaning |', '|---|---|---|---|---|')
 
 
-def table(record_type: type) -> str:
-    """Markdown table of the described fields of a dataclass."""
-    return '\n'.join((*HEAD, *_rows(record_type)))
-
-
 def _rows(record_type: type, part: str = '') -> list[str]:
-    """Rows of `table`; each name follows that of its part and a dot."""
+    """Rows of a part of a case, each name after that of its part and a dot."""
     prefix = f'{part}.' if part else ''
-    defaults = {field.name: field.default for field in dataclasses.fields(record_type)}
     found = []
     for name, meaning in meanings(record_type).items():
-        default = '' if defaults[name] is dataclasses.MISSING else f'`{_yaml(defaults[name])}`'
+        default = _default(record_type, name)
         bounds = meaning.bounds_text()
         found.append(f'| `{prefix}{name}` | {meaning.unit} | {default} | {bounds} | {meaning.description} |')
     return found
@@ -204,6 +193,22 @@ def _subparsers(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentP
     return {name: kind for action in actions for name, kind in action.choices.items()}
 
 
+def table(record_type: type) -> str:
+    """Markdown table of the keys of a part of a seal file, without bounds."""
+    rows = ['| key [unit] | meaning |', '|---|---|']
+    for name, meaning in meanings(record_type).items():
+        default = _default(record_type, name)
+        text = f'{meaning.description} Default {default}.' if default else meaning.description
+        unit = f' [{meaning.unit}]' if meaning.unit.removeprefix('1') else ''
+        rows.append(f'| `{name}`{unit} | {text} |')
+    return '\n'.join(rows)
+
+
+def _default(record_type: type, name: str) -> str:
+    default = {field.name: field.default for field in dataclasses.fields(record_type)}[name]
+    return '' if default is dataclasses.MISSING else f'`{_yaml(default)}`'
+
+
 def _yaml(value: object) -> str:
     if isinstance(value, tuple):
         return f'[{", ".join(_yaml(item) for item in value)}]'
@@ -213,41 +218,60 @@ def _yaml(value: object) -> str:
 
 
 def friction_laws() -> str:
-    """A section for each law of the registry: name in a seal file, equation, other keys it takes, parameters."""
+    """A section for each law of the registry: name in a seal file, docstring, other keys it takes, parameters."""
     sections = []
     for law in FRICTION_LAWS:
         about = re.split(r'\n\n(?:Raises|ValueError):', inspect.cleandoc(law.__doc__ or ''))[0]
         others = ', '.join(f'`{key}`' for key in sorted(keys_of_law(law) - {law.PART or law.NAME}))
-        text = f'### `coulomb_law: {law.NAME}`\n\nEquation: {law.FORMULA}. {about}'
-        text += f'\n\nIt takes {others} from the seal file.' if others else ''
-        text += f'\n\nParameters, under `{law.PART or law.NAME}`:\n\n{table(law)}' if meanings(law) else ''
+        text = f'### `coulomb_law: {law.NAME}`\n\n{_markdown(about)}'
+        text += f' It takes {others}.' if others else ''
+        text += f'\n\nUnder `{law.PART or law.NAME}`:\n\n{table(law)}' if meanings(law) else ''
         sections.append(text)
     return '\n\n'.join(sections)
 
 
+def _markdown(docstring: str) -> str:
+    """Equations and citations of a docstring as Markdown has them."""
+    text = re.sub(r'\.\. math::\s*((?:.+\n?)+)', lambda found: f'$${" ".join(found[1].split())}$$\n', docstring)
+    return text.replace(']_', ']')
+
+
 _FEEDFORWARD = {
-    'fades': 'fades to 0 within `feedforward.fade_time`',
+    'fades': 'fades to 0',
     'dips': 'fades for that sample',
 }
 
 
 def signal_faults() -> str:
-    """Markdown table of the faults of a signal, those with the same consequences in one row."""
-    rows = ['| fault | estimate | feed-forward | status | diagnostics | back to normal |', '|---|---|---|---|---|---|']
-    alike: dict[tuple[str, ...], list[Row]] = {}
-    for row in SIGNAL_ROWS:
-        bits = ', '.join(f'`{bit}`' for bit in row.status.split()) if row.status != 'any' else 'one for each'
-        force = _FEEDFORWARD.get(row.feedforward, row.feedforward)
-        alike.setdefault((row.estimate, force, bits, row.level, row.recovery), []).append(row)
-    for consequences, faults in alike.items():
-        rows.append(f'| {"; ".join(row.fault for row in faults)} | {" | ".join(consequences)} |')
-    return '\n'.join(rows)
+    """Markdown table of the faults of a signal."""
+    columns = ('fault', 'estimate', 'feed-forward', 'status')
+    return _faults(columns, (_signal_row(row) for row in SIGNAL_ROWS))
+
+
+def _signal_row(row: Row) -> tuple[str, ...]:
+    bits = ', '.join(f'`{bit}`' for bit in row.status.split()) if row.status != 'any' else 'one for each'
+    return row.fault, row.estimate, _FEEDFORWARD.get(row.feedforward, row.feedforward), bits
 
 
 def other_faults() -> str:
     """Markdown table of the faults of graph, process and disk."""
-    rows = [f'| {" | ".join((trial.fault, *trial.required))} |' for trial in TRIALS]
-    return '\n'.join([f'| fault | {" | ".join(REQUIRED)} |', '|---' * 5 + '|', *rows])
+    return _faults(('fault', *REQUIRED), ((trial.fault, *trial.required) for trial in TRIALS))
+
+
+def _faults(columns: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    """Markdown table; faults with the same consequences are in one row."""
+    alike: dict[tuple[str, ...], list[str]] = {}
+    for fault, *consequences in rows:
+        alike.setdefault(tuple(consequences), []).append(fault)
+    lines = [f'| {_named(faults)} | {" | ".join(consequences)} |' for consequences, faults in alike.items()]
+    return '\n'.join([f'| {" | ".join(columns)} |', '|---' * len(columns) + '|', *lines])
+
+
+def _named(faults: list[str]) -> str:
+    """Names of faults; the words with which all begin are said once."""
+    alike = takewhile(lambda words: len(set(words)) == 1, zip(*(fault.split() for fault in faults), strict=False))
+    start = ' '.join(words[0] for words in alike)
+    return '; '.join([faults[0], *(fault.removeprefix(start).strip() for fault in faults[1:])])
 
 
 def machine_inputs() -> str:
@@ -259,7 +283,7 @@ def machine_inputs() -> str:
 
 def filled(text: str) -> str:
     """Text of a page with every table in it made anew."""
-    tables = {record_type.__name__: table(record_type) for record_type in RECORDS}
+    tables = {record_type.__name__: table(record_type) for record_type in SEAL_PARTS}
     tables['friction_laws'] = friction_laws()
     tables |= {'lubrication_case': case_table(LUBRICATION_PARTS), 'oring_case': case_table(ORING_PARTS)}
     tables['machine_inputs'] = machine_inputs()

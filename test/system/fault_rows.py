@@ -49,8 +49,6 @@ class Row:
     """level of the diagnostics"""
     estimate: str = ''
     """requirement as text, for the documentation"""
-    recovery: str = 'with the next good sample'
-    """requirement as text"""
 
 
 def without(topic: str) -> Callable[[Tick, int], Tick]:
@@ -135,19 +133,19 @@ def everything(tick: Tick, n: int) -> Tick:
 
 UNKNOWN = (FrictionState.UNKNOWN,)
 BOTH = (FrictionState.UNKNOWN, FrictionState.SLIDING)
-LAST = 'the last usable {} stays in use'
+LAST = 'with the last valid {}'
 
 
 def _unusable() -> Iterator[Row]:
     """NaN, infinite and out of range for each input, on all ticks."""
-    for words, value in (('NaN', math.nan), ('infinite', math.inf), ('minus infinite', -math.inf), ('1e300', 1e300)):
+    for words, value in (('NaN', math.nan), ('infinite', math.inf), ('-infinite', -math.inf), ('1e300', 1e300)):
         bit = 'OUT_OF_RANGE' if math.isfinite(value) else 'NOT_FINITE'
         yield Row(
             f'pressure {words}',
             with_value('cylinder_pressure', PRESSURE, value),
             f'PRESSURE_{bit} PRESSURE_STALE',
             feedforward='fades',
-            estimate=LAST.format('pressure') + ', stale after `pressure_timeout`',
+            estimate=LAST.format('pressure'),
         )
         yield Row(
             f'force sum {words}',
@@ -191,7 +189,7 @@ SIGNAL_ROWS: tuple[Row, ...] = (
         without('cylinder_pressure'),
         'PRESSURE_STALE',
         feedforward='fades',
-        estimate='last known friction, stale after `pressure_timeout`',
+        estimate=LAST.format('pressure'),
     ),
     Row(
         'force sum stops',
@@ -214,7 +212,7 @@ SIGNAL_ROWS: tuple[Row, ...] = (
         state=(),
         feedforward='fades',
         level='STALE',
-        estimate='none: there is no sample to answer',
+        estimate='none',
     ),
     Row('reference stops', without('servo_reference'), feedforward='fades', estimate='as usual'),
     Row(
@@ -230,29 +228,28 @@ SIGNAL_ROWS: tuple[Row, ...] = (
         frozen('cylinder_pressure'),
         'PRESSURE_STALE',
         feedforward='fades',
-        estimate='last known friction, stale after `pressure_timeout`',
+        estimate=LAST.format('pressure'),
     ),
     Row(
         'pressure frozen with new stamps',
         with_value('cylinder_pressure', PRESSURE),
         level='OK',
-        estimate='as usual: a value that stands still is no fault by itself',
+        estimate='as usual',
     ),
     Row(
         'pressure jumps to another level',
         with_value('cylinder_pressure', 1.5e7),
         'PRESSURE_LEAP OUTSIDE_IDENTIFIED_RANGE MODEL_DISAGREES',
         feedforward='dips',
-        estimate='one sample with the pressure before, then the new one is believed',
-        recovery='a jump back costs one sample, too',
+        estimate='one sample with the old pressure, then with the new one; a jump back likewise',
     ),
     *_unusable(),
     *_spikes(),
     Row(
-        'denormal numbers',
+        'denormal pressure',
         with_value('cylinder_pressure', 5e-324),
         'MODEL_DISAGREES',
-        estimate='as usual: they are numbers; the friction of the rod is not that of no pressure',
+        estimate='as usual',
     ),
     Row(
         'everything at once: NaN, infinite, 1e308', everything, 'any', UNKNOWN, feedforward='fades', estimate='UNKNOWN'
@@ -265,7 +262,7 @@ SIGNAL_ROWS: tuple[Row, ...] = (
     ),
     Row('pressure duplicated', doubled('cylinder_pressure'), level='OK', estimate='as usual'),
     Row('velocity out of order', swapped('rod_velocity'), 'STAMP_NOT_INCREASING', estimate='as usual, marked'),
-    Row('pressure out of order', swapped('cylinder_pressure'), level='OK', estimate='with the one that came last'),
+    Row('pressure out of order', swapped('cylinder_pressure'), level='OK', estimate='with the last one received'),
     Row(
         'pressure stamped 1 s in the past',
         delayed('cylinder_pressure', -1000 * MS),
@@ -285,14 +282,14 @@ SIGNAL_ROWS: tuple[Row, ...] = (
         delayed('rod_velocity', -500 * MS),
         'PRESSURE_STALE FORCE_STALE STAMP_NOT_INCREASING',
         feedforward='fades',
-        estimate='last known friction, marked',
+        estimate='with the last valid inputs, marked',
     ),
     Row(
         'velocity stamped 0.5 s in the future',
         delayed('rod_velocity', 500 * MS),
         'PRESSURE_STALE FORCE_STALE',
         feedforward='fades',
-        estimate='last known friction, marked',
+        estimate='with the last valid inputs, marked',
     ),
     Row(
         'all stamps jump back by 5 s',
@@ -313,7 +310,7 @@ SIGNAL_ROWS: tuple[Row, ...] = (
         frozen('rod_velocity'),
         'PRESSURE_STALE FORCE_STALE STAMP_NOT_INCREASING',
         feedforward='fades',
-        estimate='as usual, marked',
+        estimate='with the last valid inputs, marked',
     ),
     Row(
         'force sum frozen, its stamp too',
@@ -330,12 +327,12 @@ SIGNAL_ROWS: tuple[Row, ...] = (
         estimate='as usual, marked',
     ),
     Row(
-        'one velocity stamp 15 ms ahead',
+        'velocity stamp 15 ms ahead once',
         ahead_once('rod_velocity'),
         'STAMP_NOT_INCREASING',
         estimate='as usual, marked',
     ),
     Row('reference stamps alternate by 5 ms', alternating('servo_reference'), level='OK', estimate='as usual'),
-    Row('one reference stamp 15 ms ahead', ahead_once('servo_reference'), level='OK', estimate='as usual'),
-    Row('bytes that are no message', garbage('cylinder_pressure'), estimate='as usual; counted and logged'),
+    Row('reference stamp 15 ms ahead once', ahead_once('servo_reference'), level='OK', estimate='as usual'),
+    Row('bytes that are no message', garbage('cylinder_pressure'), estimate='as usual; WARN: counted and logged'),
 )

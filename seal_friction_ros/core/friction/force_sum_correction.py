@@ -28,7 +28,7 @@ class ForceSumCorrection(CheckedParameters):
     contains_load: bool = parameter(
         False,
         unit='',
-        description='Whether the measured force sum also holds a load that no signal tells, as without a load cell.',
+        description='Whether the measured force sum also holds a load that no sensor measures, as without a load cell.',
     )
 
 

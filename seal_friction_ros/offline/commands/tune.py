@@ -34,10 +34,10 @@ def add_parser(commands: Any) -> None:
     help_text = 'write the parameters of this actuator of machine_estimator; default: that of the bag, if it has any'
     parser.add_argument('--actuator', default='', metavar='NAME', help=help_text)
     for name, meaning in _settings().items():
-        unit = f' [{meaning.unit}]' if meaning.unit else ''
-        text = f'{meaning.description}{unit}'.replace('%', '%%')
-        number = int if name == 'seed' else float
         kinds = tuple(kind for kind in both if name in meanings(kind))
+        default = f'{getattr(kinds[0], name):g} {meaning.unit.removeprefix("1")}'.strip()
+        text = f'{meaning.description} Default: {default}.'.replace('%', '%%')
+        number = int if name == 'seed' else float
         groups[kinds].add_argument(f'--{name.replace("_", "-")}', type=number, metavar='X', help=text)
     description = 'write a page on a simulated servo with and without friction'
     cli.add_page(cli.add_command(commands, 'servo', run_servo, description, 'servo --out servo.html', needs=('numba',)))

@@ -48,8 +48,7 @@ def interpolated_friction(
 class FrictionMap(FrictionLaw):
     """Friction of one seal from a table over speed and pressure.
 
-    Between the points the table is linear in pressure and in the logarithm of the speed, beyond its ends constant. A
-    table of one speed holds at every speed.
+    It is linear in pressure and in the logarithm of the speed, beyond its ends constant.
 
     ValueError: the table is not of the size of its axes, or an axis does not
     increase.
