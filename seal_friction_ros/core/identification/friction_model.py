@@ -33,6 +33,7 @@ STRIBECK_SPEED_PRIOR = (math.log(0.3), 1.0, math.log(0.01), math.log(3.0))  # ln
 ASYMMETRY_PRIOR = (0.0, 0.08, -0.9, 0.9)  # [-]
 AREA_PRIOR = (0.0, 5.0, -100.0, 100.0)  # [-] share at the highest pressure of the chamber
 OFFSET_PRIOR = (0.0, 1e3, -1e9, 1e9)  # [-] share
+NOT_TOLD = (0.0, 1e-6, -1e-5, 1e-5)  # of a term that readings do not tell: it stays 0
 CLUSTER_PRIOR = 0.03  # [-] standard deviation of the friction between clusters, expected
 CLUSTER_FREEDOM = 1.0  # with this weight
 NOTHING = 1e-6  # [-] share that counts as 0
@@ -91,6 +92,12 @@ class ModelFit:
     covariance: FloatArray  # of the vector
     rows: FloatArray  # weighted derivatives of what is left of each reading, shape (n, parameters)
     left: FloatArray  # weighted rest of each reading, shape (n,)
+    scatter: float  # [-] standard deviation of one more reading, or one more stroke of a swept log, from the model
+
+    @property
+    def told(self) -> BoolArray:
+        """Which parameters of the friction readings tell, shape (parameters,); the others are 0."""
+        return np.asarray(self.problem.prior[: self.layout.asymmetry + 1, 1] > NOT_TOLD[1])
 
     @property
     def columns(self) -> tuple[Columns, ...]:
@@ -183,9 +190,13 @@ class ModelFit:
         """Magnitude of the friction of all seals [N], shape (n,)."""
         return _magnitude(self.problem, self.vector, at)[0]
 
+    def slopes(self, at: OperatingConditions) -> FloatArray:
+        """Derivative of the friction [N] by each of its parameters, shape (n, parameters)."""
+        return _magnitude(self.problem, self.vector, at)[1]
+
     def std(self, at: OperatingConditions) -> FloatArray:
         """Standard deviation of the friction [N], shape (n,), by the covariance of the posterior."""
-        slopes = _magnitude(self.problem, self.vector, at)[1]
+        slopes = self.slopes(at)
         known = slopes.shape[1]
         return np.asarray(np.sqrt(np.einsum('ni,ij,nj->n', slopes, self.covariance[:known, :known], slopes)))
 
@@ -231,12 +242,11 @@ def _problem(
     highest = np.ones(2) if chamber_pressures is None else np.maximum(np.abs(chamber_pressures).max(axis=0), 1.0)
     both = np.zeros((readings.count, 2)) if chamber_pressures is None else chamber_pressures / highest
     free = size * np.column_stack((both, readings.source[:, np.newaxis] == two_sided))
-    off = (0.0, 1e-6, -1e-5, 1e-5)
     prior = [FRICTION_PRIOR] * (1 + len(columns))
-    prior += [VISCOUS_PRIOR if told.viscous else off, STRIBECK_PRIOR if told.stribeck else off]
+    prior += [VISCOUS_PRIOR if told.viscous else NOT_TOLD, STRIBECK_PRIOR if told.stribeck else NOT_TOLD]
     prior += [EXPONENT_PRIOR] * len(columns)
-    prior += [STRIBECK_SPEED_PRIOR, ASYMMETRY_PRIOR if told.asymmetry else off]
-    prior += [AREA_PRIOR if told.areas else off] * 2 + [OFFSET_PRIOR] * len(two_sided)
+    prior += [STRIBECK_SPEED_PRIOR, ASYMMETRY_PRIOR if told.asymmetry else NOT_TOLD]
+    prior += [AREA_PRIOR if told.areas else NOT_TOLD] * 2 + [OFFSET_PRIOR] * len(two_sided)
     table = np.array(prior)
     return Problem(readings, tuple(columns), size, speed, highest, free, table, two_sided)
 
@@ -286,8 +296,8 @@ def _clusters(readings: FrictionReadings) -> IntArray:
     return numbered(readings.source, readings.level)
 
 
-def _weights(readings: FrictionReadings, residual: FloatArray, size: float, fitted: float) -> FloatArray:
-    """Weight of each reading [1/N].
+def _weights(readings: FrictionReadings, residual: FloatArray, size: float, fitted: float) -> tuple[FloatArray, float]:
+    """Weight of each reading [1/N], and the scatter of one more reading or stroke [-].
 
     ``residual`` is that of the magnitudes [N], shape (n,), after a fit of ``fitted`` effective parameters. The variance
     of a reading is that within a cluster, and as many times that between clusters as the cluster has readings. The
@@ -303,7 +313,8 @@ def _weights(readings: FrictionReadings, residual: FloatArray, size: float, fitt
     of_prior = CLUSTER_FREEDOM / (CLUSTER_FREEDOM + freedom)
     between = max(found, 1e-8) ** (1.0 - of_prior) * CLUSTER_PRIOR ** (2.0 * of_prior)
     variance = within + count[cluster] * between
-    return np.asarray(1.0 / (np.maximum(readings.scale, 1e-3 * size) * np.sqrt(variance)))
+    scatter = math.sqrt(within / (float(count.mean()) if readings.are_samples else 1.0) + between)
+    return np.asarray(1.0 / (np.maximum(readings.scale, 1e-3 * size) * np.sqrt(variance))), scatter
 
 
 def fit_model(
@@ -324,14 +335,15 @@ def fit_model(
     """
     problem = _problem(readings, columns, told, chamber_pressures)
     vector = near if near is not None and len(near) == len(problem.prior) else _start(problem)
-    weight = 1.0 / (np.maximum(readings.scale, 1e-3 * problem.size) * CLUSTER_PRIOR)
+    scatter = CLUSTER_PRIOR
+    weight = 1.0 / (np.maximum(readings.scale, 1e-3 * problem.size) * scatter)
     for _ in range(2):
         vector, jacobian, left = _solved(problem, weight, vector)
-        fit = _model_fit(problem, vector, jacobian, left)
+        fit = _model_fit(problem, vector, jacobian, left, scatter)
         free = problem.free @ vector[fit.layout.asymmetry + 1 :]
         residual = readings.at.direction * (readings.force - free) - fit.friction(readings.at)
         fitted = len(vector) - float(np.sum(np.diag(fit.covariance) / problem.prior[:, 1] ** 2))
-        weight = _weights(readings, residual, problem.size, fitted)
+        weight, scatter = _weights(readings, residual, problem.size, fitted)
     choices = [
         _problem(readings, columns, told._replace(stribeck=falling, asymmetry=uneven), chamber_pressures)
         for falling in sorted({told.stribeck, False})
@@ -339,7 +351,7 @@ def fit_model(
     ]
     found = [(each, *_solved(each, weight, vector)) for each in choices]
     problem, vector, jacobian, left = max(found, key=lambda one: _evidence(*one))
-    return _model_fit(problem, vector, jacobian, left)
+    return _model_fit(problem, vector, jacobian, left, scatter)
 
 
 def without_group(fit: ModelFit, out: BoolArray) -> ModelFit:
@@ -394,6 +406,8 @@ def _start(problem: Problem) -> FloatArray:
     return start
 
 
-def _model_fit(problem: Problem, vector: FloatArray, jacobian: FloatArray, left: FloatArray) -> ModelFit:
-    count = problem.readings.count
-    return ModelFit(problem, vector, np.asarray(np.linalg.inv(jacobian.T @ jacobian)), jacobian[:count], left[:count])
+def _model_fit(
+    problem: Problem, vector: FloatArray, jacobian: FloatArray, left: FloatArray, scatter: float
+) -> ModelFit:
+    count, covariance = problem.readings.count, np.asarray(np.linalg.inv(jacobian.T @ jacobian))
+    return ModelFit(problem, vector, covariance, jacobian[:count], left[:count], scatter)

@@ -12,7 +12,7 @@ import numpy as np
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.friction.mounting import pressures_at_seals
 from seal_friction_ros.core.identification import signal_preparation
-from seal_friction_ros.core.identification.admission import NOT_FINITE
+from seal_friction_ros.core.identification.admission import ACCELERATED, AT_REST, NOT_FINITE, Account, account
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
 from seal_friction_ros.core.identification.readings import (
     FrictionReadings,
@@ -50,24 +50,23 @@ def prepare_logs(logs: Sequence[RecordedLog], chambers: Sequence[str]) -> Prepar
         (i, stroke) for i, log in enumerate(logs) for stroke in signal_preparation.strokes(log.signals, log.sliding)
     ]
     even = [signal_preparation.even_sliding(log.signals, log.sliding) for log in logs]
-    held = [sum(len(stroke.samples) for source, stroke in of_strokes if source == i) for i in range(len(logs))]
-    counts = [int(part.sum()) for part in even]
-    if sum(held) < HELD_LOG * sum(counts):
+    used = [np.zeros(len(part), dtype=bool) for part in even]
+    for i, stroke in of_strokes:
+        used[i][stroke.samples] = True
+    if sum(part.sum() for part in used) < HELD_LOG * sum(part.sum() for part in even):
         readings, chamber_pressures = _swept(logs, even, chambers)
-        breakaway = None
+        breakaway, used = None, even
     else:
         readings, chamber_pressures = _held(logs, of_strokes, chambers)
         breakaway = _breakaway(logs, chambers, readings)
-        counts = held
     free = free_rod([log.signals for log in logs], even)
     if free is not None:
         one_level = replace(readings, free_rod=free, level=np.zeros_like(readings.level))
         readings = with_predictable_groups(one_level)
         breakaway = breakaway and replace(breakaway, free_rod=free, level=np.zeros_like(breakaway.level))
     check_readings(readings)
-    used = {log.name: count for log, count in zip(logs, counts, strict=True)}
-    total = {log.name: len(log.signals.time) + sum(log.dropped.values()) for log in logs}
-    return PreparedReadings(readings, chamber_pressures, breakaway, used, total, _left_out(logs, even, sum(counts)))
+    accounts = tuple(_account(log, *masks) for log, *masks in zip(logs, even, used, strict=True))
+    return PreparedReadings(readings, chamber_pressures, breakaway, accounts)
 
 
 def _seal_pressures(chamber_pressures: FloatArray, chambers: Sequence[str]) -> FloatArray:
@@ -194,19 +193,13 @@ def _swept(
     return readings, both
 
 
-def _left_out(logs: Sequence[RecordedLog], even: Sequence[BoolArray], used: int) -> dict[str, int]:
-    """Reason -> number of samples not used."""
-    reasons = (NOT_FINITE, 'at rest', 'accelerated', 'in no even stroke')
-    counts = dict(zip(reasons, (0, 0, 0, -used), strict=True))
-    for log, index in zip(logs, even, strict=True):
-        finite = np.logical_and.reduce([np.isfinite(column) for column in log.signals])
-        with np.errstate(invalid='ignore'):
-            moving = np.abs(log.signals.velocity) > log.sliding.slowest
-        masks = (~finite, finite & ~moving, finite & moving & ~index, index)
-        parts = zip(reasons, masks, strict=True)
-        counts |= {reason: counts[reason] + int(mask.sum()) for reason, mask in parts}
-        counts |= {reason: counts.get(reason, 0) + count for reason, count in log.dropped.items()}
-    return {reason: count for reason, count in counts.items() if count}
+def _account(log: RecordedLog, even: BoolArray, used: BoolArray) -> Account:
+    """Samples of a log that are used, and why the others are not."""
+    is_finite = np.logical_and.reduce([np.isfinite(column) for column in log.signals])
+    with np.errstate(invalid='ignore'):
+        moves = np.abs(log.signals.velocity) > log.sliding.slowest
+    reasons = {NOT_FINITE: ~is_finite, AT_REST: ~moves, ACCELERATED: ~even, 'in no even stroke': ~used}
+    return account(log.name, reasons, log.dropped)
 
 
 def prepare_manual_readings(
@@ -227,8 +220,8 @@ def prepare_manual_readings(
         several = len(np.unique(breakaway.level)) > 1
         if several and (readings.left_out_by == 'pressure' or breakaway.left_out_by != 'test'):
             breakaway = replace(breakaway, group=breakaway.level, left_out_by='pressure')
-    counts = {manual.name: len(manual.friction) for manual in dynamic}
-    return PreparedReadings(readings, np.repeat(readings.at.pressure[:, :1], 2, axis=1), breakaway, counts, counts, {})
+    accounts = tuple(Account(manual.name, len(manual.friction), {}) for manual in dynamic)
+    return PreparedReadings(readings, np.repeat(readings.at.pressure[:, :1], 2, axis=1), breakaway, accounts)
 
 
 def _joined(sources: Sequence[ManualReadings], seals: int) -> FrictionReadings:

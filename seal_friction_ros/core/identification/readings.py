@@ -13,6 +13,7 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.foundation.units import BAR
+from seal_friction_ros.core.identification.admission import Account
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions, SealKind
 from seal_friction_ros.core.identification.signal_preparation import (
     LONGEST_GAP,
@@ -252,9 +253,7 @@ class PreparedReadings(NamedTuple):
     readings: FrictionReadings
     chamber_pressures: FloatArray  # [Pa] of chambers a and b at each reading, shape (n, 2)
     breakaway: FrictionReadings | None  # None if no motion starts from rest
-    used: dict[str, int]  # source -> number of samples behind the readings
-    total: dict[str, int]  # source -> number of its samples
-    left_out: dict[str, int]  # reason -> number of samples not used
+    accounts: tuple[Account, ...]  # samples of each source
 
 
 def check_log(log: RecordedLog) -> None:

@@ -14,6 +14,7 @@ of the sliding samples but for the largest `NOISE_SHARE`, whichever is larger. A
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -23,6 +24,7 @@ from seal_friction_ros.core.estimation import feedforward
 from seal_friction_ros.core.estimation.feedforward import FADED_IN, UNUSABLE, FeedForwardSettings, wanted_velocity
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.identification.admission import AT_REST, BAD_INPUT, NOT_FINITE, Account, account
 from seal_friction_ros.core.messages.records import NO_ESTIMATE, Status
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, RobustnessCase, TunedFeedForward
 from seal_friction_ros.core.tuning.simulated_axis import bounded, force_limit, nearest_preferred, preferred
@@ -52,6 +54,7 @@ class Recording(NamedTuple):
     reference_velocity: FloatArray  # [m/s] conditioned, as in `pipeline`
     reference_acceleration: FloatArray  # [m/s^2]
     reference_age: FloatArray  # [s]
+    dropped: Mapping[str, int] = {}  # reason -> number of samples that are not in it
 
     @property
     def time(self) -> FloatArray:
@@ -69,6 +72,7 @@ class RecordedLaw(NamedTuple):
     offset: float  # [N] F_0; 0 where the rod moves in one direction only
     friction: FloatArray  # [N] force sum less inertia less offset; NaN where it is unknown
     sliding: BoolArray  # samples of the fit
+    samples: Account  # of the recording
 
 
 class Residual(NamedTuple):
@@ -125,8 +129,14 @@ def fit_law(recording: Recording, mass: float | None = None) -> RecordedLaw:
     slope = acceleration(recording.time, velocity)
     speed = np.abs(velocity)
     slow = speed < SLOW * np.max(speed[np.isfinite(speed)], initial=0.0)
-    usable = (status & UNUSABLE == 0) & ~(slow & (status & int(Status.MOTION_UNCERTAIN) != 0))
-    sliding = (state == FrictionState.SLIDING) & usable & np.isfinite(slope) & np.isfinite(recording.force_sum)
+    reasons = {
+        NOT_FINITE: ~np.isfinite(velocity) | ~np.isfinite(recording.force_sum),
+        BAD_INPUT: status & UNUSABLE != 0,
+        AT_REST: state != FrictionState.SLIDING,
+        'rest or motion': slow & (status & int(Status.MOTION_UNCERTAIN) != 0),
+        'uneven in time': ~np.isfinite(slope),
+    }
+    sliding = ~np.logical_or.reduce(list(reasons.values()))
     count = int(np.count_nonzero(sliding))
     if count < FEWEST_SLIDING:
         few = f'the rod slides in {count} usable samples, the friction needs {FEWEST_SLIDING}'
@@ -147,7 +157,8 @@ def fit_law(recording: Recording, mass: float | None = None) -> RecordedLaw:
     moved = values[1] if mass is None else mass
     offset = values.get(2, 0.0)
     friction = recording.force_sum - moved * slope - offset
-    return RecordedLaw(values[0], math.sqrt(variance), moved, mass is None, offset, friction, sliding)
+    samples = account('', reasons, recording.dropped)
+    return RecordedLaw(values[0], math.sqrt(variance), moved, mass is None, offset, friction, sliding, samples)
 
 
 def near_reversals(time: FloatArray, reference_velocity: FloatArray) -> BoolArray:

@@ -15,6 +15,7 @@ import numpy as np
 
 from seal_friction_ros.core.estimation.configuration import Snapshot, snapshot_text
 from seal_friction_ros.core.foundation.stamps import StampRepair
+from seal_friction_ros.core.identification.admission import MALFORMED, NO_VELOCITY, NOT_STARTED, Account
 from seal_friction_ros.core.machine.gauge_or_absolute import Lowest, pressure_remarks
 from seal_friction_ros.core.machine.machine import Machine, MachineActuator, MachineState
 from seal_friction_ros.core.messages.coder import encode, encode_text, type_of
@@ -35,6 +36,7 @@ class ActuatorImport(NamedTuple):
     messages: dict[str, int]  # topic of this project -> number of messages
     tracking_rms: float | None  # [m] of reference minus position; None without one of them
     remarks: tuple[str, ...]  # what was missing or looks wrong
+    samples: Account  # messages on the topic of its velocity
 
 
 def convert_bag(bag: Path, out: Path, mapping: MappingFile, also: Collection[str] = ()) -> dict[str, ActuatorImport]:
@@ -56,20 +58,21 @@ def convert_bag(bag: Path, out: Path, mapping: MappingFile, also: Collection[str
         with ExitStack() as stack:
             writers = [stack.enter_context(rosbag.BagWriter(folder)) for folder in folders.values()]
             present = {topic: info.message_count for topic, info in topics.items() if info.message_count}
-            counts, missing, lowest, tracks = _write(machine, state, bag, writers, present, also)
-            for one, count in zip(machine.actuators, counts, strict=True):
-                if not count['/rod_velocity']:
+            counts, missing, lowest, tracks, accounts = _write(machine, state, bag, writers, present, also)
+            for one, samples in zip(machine.actuators, accounts, strict=True):
+                if not samples.used:
                     raise ValueError(no_velocity(bag, one.name, missing))
+                samples.check()
     except BaseException:
         if several and out.is_dir() and not any(out.iterdir()):
             out.rmdir()
         raise
     absent = [f'{topic} is not in the bag' for topic in machine.plans if topic not in topics]
     found = {}
-    for one, count, low, track in zip(machine.actuators, counts, lowest, tracks, strict=True):
+    for one, count, low, track, samples in zip(machine.actuators, counts, lowest, tracks, accounts, strict=True):
         pressures = (f'{one.name}: {text}' for text in pressure_remarks(mapping.file, one.mapping, low))
-        remarks = (*absent, *missing, *pressures)
-        found[one.name] = ActuatorImport(folders[one.name], dict(count), track.rms, remarks)
+        remarks = (*absent, *missing, *pressures, *samples.warnings)
+        found[one.name] = ActuatorImport(folders[one.name], dict(count), track.rms, remarks, samples)
     return found
 
 
@@ -105,17 +108,17 @@ def _write(
     writers: list[rosbag.BagWriter],
     present: Mapping[str, int],
     also: Collection[str],
-) -> tuple[list[Counter[str]], list[str], list[Lowest], list[_Track]]:
+) -> tuple[list[Counter[str]], list[str], list[Lowest], list[_Track], list[Account]]:
     """Write what each actuator gets, its velocity from the first pressure and force sum on.
 
     A recorder hears its topics one after the other, so the first messages of some are missing. Returns the number of
-    messages by topic, what messages lacked, and of each actuator its lowest pressures and its tracking.
+    messages by topic, what messages lacked, and of each actuator its lowest pressures, its tracking and its samples.
     """
     lowest = [Lowest() for _ in machine.actuators]
     tracks = [_Track() for _ in machine.actuators]
     awaited = [_awaited(one, present) for one in machine.actuators]
     counts: list[Counter[str]] = [Counter() for _ in machine.actuators]
-    missing: Counter[str] = Counter()
+    missing, read, early = Counter[str](), Counter[str](), Counter[int]()
     repairs: dict[tuple[int, str], StampRepair] = {}
     translation = Translation(machine, state)
     with progress(f'import {bag.name}', sum(present.values())) as advance:
@@ -127,6 +130,7 @@ def _write(
                 writer.write(*message)
             if message.topic not in machine.plans:
                 continue
+            read[message.topic] += 1
             with rosbag.named(bag, message):
                 for number, record, frame_id in translation.records(message._replace(publish_time=None), missing):
                     kind = type_of(record)
@@ -134,6 +138,7 @@ def _write(
                     record = record._replace(stamp=stamp)  # noqa: PLW2901  the repaired one in its place
                     awaited[number].discard(kind)
                     if kind == VELOCITY_TYPE and awaited[number]:
+                        early[number] += 1
                         continue
                     writers[number].write(_TOPICS[kind], kind, message.log_time, encode(record, frame_id))
                     counts[number][_TOPICS[kind]] += 1
@@ -145,7 +150,21 @@ def _write(
         for (number, kind), one in repairs.items()
         for text in one.said(f'{machine.actuators[number].name}: the stamp of {_TOPICS[kind].lstrip("/")}')
     ]
-    return counts, [*lacking(missing), *said], lowest, tracks
+    accounts = [
+        _account(bag, one, read, translation.malformed, early[number], counts[number][_TOPICS[VELOCITY_TYPE]])
+        for number, one in enumerate(machine.actuators)
+    ]
+    return counts, [*lacking(missing), *said], lowest, tracks, accounts
+
+
+def _account(
+    bag: Path, actuator: MachineActuator, read: Counter[str], malformed: Counter[str], early: int, used: int
+) -> Account:
+    """Messages on the topic of the velocity of an actuator, by the numbers ``read`` and ``malformed`` on each topic."""
+    (topic,) = sources_of(actuator)['velocity']
+    nothing = read[topic] - malformed[topic] - early - used
+    left_out = {MALFORMED: malformed[topic], NO_VELOCITY: nothing, NOT_STARTED: early}
+    return Account(f'{bag}: {actuator.name}', used, {reason: count for reason, count in left_out.items() if count})
 
 
 def _awaited(actuator: MachineActuator, present: Collection[str]) -> set[str]:

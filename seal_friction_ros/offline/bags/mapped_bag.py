@@ -124,11 +124,12 @@ class Translation:
     """Records of this project in the messages of a machine, as its estimator makes them.
 
     Of the state only clocks and what the newest messages held count. ``only`` names the actuator whose records are
-    made; empty: all.
+    made; empty: all. ``malformed`` counts the messages that could not be read, by topic.
     """
 
     def __init__(self, machine: Machine, state: MachineState, only: str = '') -> None:
         self._actuators, self._states = machine.actuators, list(state.actuators)
+        self.malformed: Counter[str] = Counter()
         self._plans = {
             topic: plan._replace(taken=tuple(one for one in plan.taken if only in ('', machine.actuators[one[0]].name)))
             for topic, plan in machine.plans.items()
@@ -151,6 +152,7 @@ class Translation:
             reading = plan.read(message.data)
         except ValueError as error:  # as the node: it counts the message as malformed and goes on
             missing[f'{message.topic}: {error}'] += 1
+            self.malformed[message.topic] += 1
             return
         missing.update(f'{message.topic}: {text}' for text in reading.missing)
         for number, taken in plan.taken:

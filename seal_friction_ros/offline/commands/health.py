@@ -49,6 +49,7 @@ _LIMITS: dict[str, tuple[str, cli.Settings]] = {
 def run_health(arguments: argparse.Namespace) -> int:
     """Follow the bags in order of time."""
     from seal_friction_ros.core.estimation.findings import Limits
+    from seal_friction_ros.core.identification.admission import Account
     from seal_friction_ros.offline.replay.bag_health import health_of_bags
     from seal_friction_ros.offline.replay.replay import chosen_configuration
     from seal_friction_ros.offline.reports.health_report import write_health_report
@@ -66,9 +67,12 @@ def run_health(arguments: argparse.Namespace) -> int:
     names = [str(bag) for _, bag in seen]
     summary = write_health_report(names, [one for one, _ in seen], arguments.out, limits)
     lines = [f'{summary.numbers["level"]}: {summary.numbers["verdict"]}']
-    for day in summary.numbers['bags']:
+    for day, (one, _) in zip(summary.numbers['bags'], seen, strict=True):
+        samples = Account(day['bag'], one.used, one.left_out)
+        day.update(samples.numbers)
         lines.append(f'{day["bag"]}: {_learnt_text(day) if day["reversals"] else "no reversal to learn from"}')
         lines += [f'  {day["level"]}: {day["why"]}', *(f'  alarm: {alarm}' for alarm in day['alarms'])]
+        lines += [f'  {samples.text}', *(f'  warning: {text}' for text in samples.warnings)]
     lines += [
         f'change: from {change["scale_before"]:.3f} to {change["scale_then"]:.3f} at {change["time_s"]:.3f} s'
         for change in summary.numbers['changes']

@@ -75,9 +75,10 @@ def _of_bag(found: 'dict[str, ActuatorImport]', out: Path) -> tuple[dict[str, An
     numbers, lines = {}, []
     for name, one in found.items():
         bag = out / name if len(found) > 1 else out
-        numbers[name] = one._replace(bag=bag)._asdict()
+        *fields, samples = one._replace(bag=bag)
+        numbers[name] = dict(zip(one._fields, fields, strict=False)) | samples.numbers
         counts = ', '.join(f'{count} {topic.lstrip("/")}' for topic, count in sorted(one.messages.items()))
-        lines += [f'{bag}: {name}: {counts}']
+        lines += [f'{bag}: {name}: {counts}', f'  {one.samples.text}']
         lines += [] if one.tracking_rms is None else [f'  tracking error {one.tracking_rms / MM:.3g} mm RMS']
         lines += [f'  {remark}' for remark in one.remarks]
     return numbers, '\n'.join(lines)

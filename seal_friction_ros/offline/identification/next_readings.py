@@ -20,12 +20,12 @@ LIMITS = {
 
 
 def design_for(found: Identification) -> experiment_design.ExperimentDesign:
-    """The design of the next readings for the ladder and the readings of an identification."""
+    """The design of the next readings for those of an identification."""
     used, quality = found.selection.readings, found.quality
     runs_are_left_out = used.left_out_by in ('test', 'file') and not quality.is_stated
     between = None if quality.is_stated or runs_are_left_out else quality.between_runs
     of_band = between.of_band if between is not None else quality.between_runs.std
-    return experiment_design.design_experiment(found.selection.scores, used, between, of_band)
+    return experiment_design.design_experiment(used, between, of_band)
 
 
 def plan_of(found: Identification, design: experiment_design.ExperimentDesign) -> FrictionTestPlan:
@@ -48,9 +48,6 @@ def plan_of(found: Identification, design: experiment_design.ExperimentDesign) -
 
 def numbers_of(design: experiment_design.ExperimentDesign) -> dict[str, Any]:
     """Numbers for JSON: ``next``, the readings in the order of their use, and ``next_effect``."""
-    before, after = design.correlation_before, design.correlation_after
-    pair = before and after and {'parameters': [before.one, before.other], 'before': before.correlation,
-                                 'after': after.correlation}  # fmt: skip
     numbers: dict[str, Any] = rounded_numbers(
         {
             'next': [
@@ -59,13 +56,11 @@ def numbers_of(design: experiment_design.ExperimentDesign) -> dict[str, Any]:
                     'speed_m_per_s': r.speed,
                     'directions': r.directions,
                     'shrink': r.shrink,
-                    'disagreement': r.disagreement,
                     'is_repeated': r.is_repeated,
                 }
                 for r in design.readings
             ],
             'next_effect': {
-                'law': design.law.name,
                 'limit': design.limit,
                 'parts': design.parts,
                 'error_before': design.error_before,
@@ -73,9 +68,7 @@ def numbers_of(design: experiment_design.ExperimentDesign) -> dict[str, Any]:
                 'shrink': design.shrink,
                 'pressures_Pa': design.pressures,
                 'speeds_m_per_s': design.speeds,
-                'correlation': pair,
-                'condition_number_before': design.condition_before,
-                'condition_number_after': design.condition_after,
+                'correlation': design.correlation._asdict(),
             },
         }
     )
@@ -123,16 +116,12 @@ def texts_of(found: Identification, design: experiment_design.ExperimentDesign) 
     low, high = (pressure / BAR for pressure in design.pressures)
     slow, fast = (speed / MM for speed in design.speeds)
     yield (
-        f'the standard error of {design.law.name} over {low:.3g} to {high:.3g} bar and {slow:.3g} to {fast:.3g} mm/s '
-        f'is {_percent(design.error_before)} of the friction; with the proposed readings '
-        f'{_percent(design.error_after)}'
+        f'the standard error of the friction over {low:.3g} to {high:.3g} bar and {slow:.3g} to {fast:.3g} mm/s '
+        f'is {_percent(design.error_before)}; with the proposed readings {_percent(design.error_after)}'
     )
-    before, after = design.correlation_before, design.correlation_after
-    if before is not None and after is not None and abs(before.correlation) > abs(after.correlation):
-        yield (
-            f'correlation of {before.one} and {before.other}: {before.correlation:+.2f} -> {after.correlation:+.2f}; '
-            f'condition number: {design.condition_before:.3g} -> {design.condition_after:.3g}'
-        )
+    pair, before, after = design.correlation
+    if abs(before) > abs(after):
+        yield f'correlation of {" and ".join(pair)}: {before:+.2f} -> {after:+.2f}'
     if not design.speed_is_measured:
         yield (
             f'the readings have no speed: {experiment_design.ASSUMED_SPEED / MM:g} mm/s is assumed, and the speeds are '

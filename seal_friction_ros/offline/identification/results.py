@@ -12,6 +12,7 @@ from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw
 from seal_friction_ros.core.friction.seal_file import law_document, parse_seal
 from seal_friction_ros.core.identification import fitting
+from seal_friction_ros.core.identification.admission import together
 from seal_friction_ros.core.identification.breakaway import BreakawayFit
 from seal_friction_ros.core.identification.calibration import Calibration
 from seal_friction_ros.core.identification.candidate_laws import DIVIDED, CandidateLaw, SealKind, columns_of
@@ -410,9 +411,9 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
         'changes': [change._asdict() for change in quality.changes if change.is_changed],
         'load': found.document['identification'].get('load'),
         'presliding': found.document['identification'].get('presliding'),
-        'samples_used': data.prepared.used,
-        'samples_total': data.prepared.total,
-        'samples_left_out': data.prepared.left_out,
+        'samples_used': {one.name: one.used for one in data.prepared.accounts},
+        'samples_total': {one.name: one.total for one in data.prepared.accounts},
+        'samples_left_out': together(data.prepared.accounts).left_out,
         'remarks': list(found.remarks),
         **rounded_numbers(kinds_numbers(found)),
     }

@@ -331,8 +331,8 @@ def _admitted(log: RecordedLog) -> tuple[RecordedLog, tuple[str, ...]]:
     count = int(np.logical_or.reduce(masks).sum())
     signals = Signals(log.signals.time, *columns)
     missing = int((~np.isfinite(np.array(columns)).all(axis=0)).sum())
-    total, faulty = len(signals.time) + sum(log.dropped.values()), {**log.dropped, admission.NOT_FINITE: missing}
-    admission.check_admitted(log.name, total, faulty)
+    used, left_out = len(signals.time) - missing, {**log.dropped, admission.NOT_FINITE: missing}
+    admission.Account(log.name, used, left_out).check()
     texts = (f'{log.name}: {count} samples had no value, and are on a straight line between their neighbours',)
     return log._replace(signals=signals), texts * (count > 0)
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.units import BAR, ZEROS
 from seal_friction_ros.core.identification import diagnostics
-from seal_friction_ros.core.identification.admission import FAULTS, WORTH_A_WARNING
+from seal_friction_ros.core.identification.admission import together
 from seal_friction_ros.core.identification.breakaway import BreakawayFit
 from seal_friction_ros.core.identification.force_correction import ForceCorrection
 from seal_friction_ros.core.identification.readings import has_pressures
@@ -35,7 +35,7 @@ def warnings_of(
 ) -> Iterator[str]:
     """Limits of the law that its user has to know, one line each."""
     readings = data.prepared.readings
-    yield from _dropped_texts(data)
+    yield from together(data.prepared.accounts).warnings
     yield from _change_texts(quality)
     one_way = [name for name, index in zip(readings.names, readings.two_sided, strict=True) if not len(index)]
     if one_way:
@@ -70,14 +70,6 @@ def warnings_of(
         yield _dwell_text(quality.breakaway)
     if quality.breakaway is None and not readings.are_samples:
         yield 'no stroke starts from rest, so breakaway is not identified: let the rod rest 30 s before some strokes'
-
-
-def _dropped_texts(data: IdentificationData) -> Iterator[str]:
-    total, dropped = sum(data.prepared.total.values()), data.prepared.left_out
-    for reason in FAULTS:
-        count = dropped.get(reason, 0)
-        if count > WORTH_A_WARNING * total:
-            yield f'{count} of {total} samples ({100.0 * count / total:.0f} %) are dropped: {reason}'
 
 
 def _free_rod_text(found: FreeRod) -> str:
@@ -259,11 +251,9 @@ def _settled_text(settled: SettledLaw, selection: LawSelection) -> str:
 
 def remarks_on(data: IdentificationData, selection: LawSelection) -> Iterator[str]:
     """Assumptions and how to change them, one line each."""
-    prepared = data.prepared
-    if prepared.left_out:
-        total, used = sum(prepared.total.values()), sum(prepared.used.values())
-        why = ', '.join(f'{name} {100.0 * count / total:.0f} %' for name, count in prepared.left_out.items())
-        yield f'{used} of {total} samples used ({100.0 * used / total:.0f} %); not used: {why}'
+    prepared, samples = data.prepared, together(data.prepared.accounts)
+    if samples.left_out:
+        yield samples.text
     if data.temperature is not None:
         yield _temperature_text(data.temperature)
     gain = _pressure_gain(selection)

@@ -5,7 +5,7 @@ with its length.
 """
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,10 +20,13 @@ from seal_friction_ros.core.estimation.findings import GOOD, USUAL_LIMITS, Limit
 from seal_friction_ros.core.estimation.friction_filter import PROVEN
 from seal_friction_ros.core.estimation.seal_health import START, Starts, with_sample
 from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.friction.states import SLIDING
+from seal_friction_ros.core.identification import admission
+from seal_friction_ros.core.identification.admission import Account, account, together
 from seal_friction_ros.core.messages.blocks import Messages, UnsuitedError, numbers_of
 from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE
-from seal_friction_ros.core.messages.records import NEVER, NO_ESTIMATE, FrictionEstimate
+from seal_friction_ros.core.messages.records import NEVER, NO_ESTIMATE, FrictionEstimate, Status
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.bags.actuator_bag import open_actuator
 from seal_friction_ros.offline.bags.bag import BagError
@@ -52,6 +55,8 @@ class BagHealth(NamedTuple):
     level: str = GOOD  # verdict on the run, if it was asked for
     why: str = ''
     next: str = ''
+    used: int = 0  # samples that friction is learnt from
+    left_out: Mapping[str, int] = {}  # reason -> number of samples
 
 
 def bag_health(
@@ -62,7 +67,7 @@ def bag_health(
     on_block: Callable[[Messages, Answers, Any], None] = lambda *_: None,
     mapping: MappingFile | None = None,
 ) -> BagHealth:
-    """Health from one bag; BagError: the bag cannot be read, or not in blocks.
+    """Health from one bag; BagError: the bag cannot be read, or not in blocks, or most of its samples are faulty.
 
     The ``override`` is the configuration instead of the recorded one; its mode counts as observe. ``learnt`` is what
     was learnt from the bags before. ``on_block`` is called with each block of messages, the answers to them, and the
@@ -71,7 +76,7 @@ def bag_health(
     """
     rows: list[FloatArray] = []
     starts: list[float] = []
-    end, follower, strokes = learnt, Starts(), _Strokes()
+    end, follower, strokes, accounts = learnt, Starts(), _Strokes(), [Account('', 0, {})]
     source = open_actuator(bag, namespace, mapping)
     run = _Observer(_observing(override or default_configuration()), has_override=override is not None)
     if learnt is not None:
@@ -82,16 +87,37 @@ def bag_health(
             on_block(messages, answers, estimates)
             if len(estimates):
                 end = run.state.estimator.adaptation
+                accounts.append(_account(estimates))
                 rows.append(strokes.ends(estimates))
                 follower, found = _with_block(follower, estimates)
                 starts += found
     except (UnsuitedError, OSError, *ERRORS) as error:
         raise BagError(f'{bag}: {error}: `seal_friction replay` tells more') from None
+    samples = together(accounts)._replace(name='')
+    with named_errors(bag, raised=BagError):
+        samples.check()
     table = np.concatenate(rows, axis=1) if rows else np.zeros((5, 0))
     table = table[:, np.append(True, np.diff(table[1]) != 0.0)] if table.shape[1] else table  # nothing learnt between
     noise = learnt_of(end).noise if end is not None and end.filter.stamp != NEVER else float('nan')
     time, scale, scale_std, offset, friction = table
-    return BagHealth(time, scale, scale_std, offset, friction, noise, np.array(starts), end)
+    seen = BagHealth(time, scale, scale_std, offset, friction, noise, np.array(starts), end)
+    return seen._replace(used=samples.used, left_out=samples.left_out)
+
+
+_REASONS = {
+    admission.OLD_STAMP: Status.STAMP_NOT_INCREASING,
+    'no pressure or no force sum yet': Status.PRESSURE_MISSING | Status.FORCE_MISSING,
+    admission.NOT_FINITE: Status.PRESSURE_NOT_FINITE | Status.FORCE_NOT_FINITE | Status.VELOCITY_NOT_FINITE,
+    admission.BAD_INPUT: Status.PRESSURE_STALE | Status.FORCE_STALE | Status.PRESSURE_OUT_OF_RANGE
+    | Status.FORCE_OUT_OF_RANGE | Status.VELOCITY_OUT_OF_RANGE | Status.PRESSURE_LEAP | Status.FORCE_LEAP
+    | Status.VELOCITY_LEAP,
+}  # fmt: skip
+
+
+def _account(estimates: Any) -> Account:
+    """Samples that were estimated while the rod slid, and why the others do not tell the friction."""
+    reasons = {reason: (estimates['status'] & int(bits)) != 0 for reason, bits in _REASONS.items()}
+    return account('', {**reasons, admission.AT_REST: estimates['state'] != SLIDING})
 
 
 def health_of_bags(

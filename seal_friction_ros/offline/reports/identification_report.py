@@ -210,8 +210,7 @@ def _correlation_table(found: Identification) -> Table:
 
 
 def _data_table(found: Identification) -> Table:
-    total = found.data.prepared.total
-    used = {name: f'{count} of {total[name]}' for name, count in found.data.prepared.used.items()}
+    used = {one.name: f'{one.used} of {one.total}' for one in found.data.prepared.accounts}
     files = found.data.sources.files
     rows = [(file.name, used.get(file.name, 'not used: see the warnings'), file.sha256) for file in files]
     return Table(('source', 'samples used', 'SHA-256'), rows, (0, 1, 2))

@@ -22,6 +22,7 @@ from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.foundation.parameters import meanings
 from seal_friction_ros.core.foundation.units import MM, MS, UM
+from seal_friction_ros.core.identification import admission
 from seal_friction_ros.core.messages import layouts
 from seal_friction_ros.core.messages.blocks import Numbers
 from seal_friction_ros.core.messages.records import ServoReference
@@ -178,8 +179,9 @@ class BagTuning:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Sentences on the force limit and placeholder seals."""
-        return self.task.remarks(self.found)
+        """Sentences on the force limit, placeholder seals and samples."""
+        samples = self.found.law.samples
+        return (*self.task.remarks(self.found), *(f'{text}.' for text in (samples.text, *samples.warnings)))
 
     @property
     def numbers(self) -> dict[str, Any]:
@@ -206,6 +208,7 @@ class BagTuning:
                 for friction_error, delay_error, left in found.cases
             ],
             **self.track.numbers(),
+            **law.samples.numbers,
             'settings': asdict(self.known),
         }
 
@@ -275,6 +278,7 @@ def tune_bag(
     recording, track, recorded = read_recording(actuator, configuration)
     with named_errors(actuator.path, raised=BagError):
         found = tune_recorded_axis(recording, recorded.feedforward, known)
+        found.law.samples.check()
     tuned = tuple(parameter for parameter, is_identified in found.identified.items() if is_identified)
     motion = f'{len(recording.stamps)} samples, {recording.time[-1]:.3f} s'
     seals, source = _seals_text(recorded), f'bag {actuator.name}'
@@ -337,8 +341,8 @@ class _AxisCollector(RunCollector):
         own = np.frombuffer(self.stamps, np.int64)
         before = np.concatenate([places for _, places in self._references])
         newest = np.searchsorted(before, np.arange(len(own)), side='right') - 1
-        chosen = np.flatnonzero(newest >= 0)
-        chosen = chosen[np.diff(np.maximum.accumulate(own[chosen]), prepend=own[chosen][:1] - 1) > 0]
+        led = np.flatnonzero(newest >= 0)
+        chosen = led[np.diff(np.maximum.accumulate(own[led]), prepend=own[led][:1] - 1) > 0]
         if len(chosen) < 2:
             raise BagError(f'{source.path}: fewer than two velocity samples after the first reference')
         run, reference = self.run(source), newest[chosen]
@@ -350,6 +354,7 @@ class _AxisCollector(RunCollector):
             reference_velocity=moved[0, reference],
             reference_acceleration=moved[1, reference],
             reference_age=np.asarray((own[chosen] - stamps[reference]) * 1e-9, np.float64),
+            dropped={admission.NO_REFERENCE: len(own) - len(led), admission.OLD_STAMP: len(led) - len(chosen)},
         )
         return recording, RecordedTrack(run.reference[chosen], run.position[chosen]), configuration
 

@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from seal_friction_ros.core.identification.admission import (
     NOT_FINITE,
     SAME_STAMP,
+    Account,
+    account,
     bridged,
-    check_admitted,
     in_order,
 )
 from seal_friction_ros.core.identification.prepare_readings import prepare_logs
@@ -68,9 +69,25 @@ def test_up_to_three_missing_values_are_on_a_straight_line():
 
 
 def test_more_faulty_samples_than_half_are_refused_with_the_reasons():
-    check_admitted('log', 100, {SAME_STAMP: 30, NOT_FINITE: 20, 'at rest': 50})
+    Account('log', 0, {SAME_STAMP: 30, NOT_FINITE: 20, 'at rest': 50}).check()
     with pytest.raises(ValueError, match=r'^log: 51 of 100 samples cannot be used .same stamp 30, not finite 21.'):
-        check_admitted('log', 100, {SAME_STAMP: 30, NOT_FINITE: 21})
+        Account('log', 49, {SAME_STAMP: 30, NOT_FINITE: 21}).check()
+
+
+def test_a_fault_of_more_than_one_sample_in_a_hundred_is_a_warning():
+    assert list(Account('log', 990, {NOT_FINITE: 10}).warnings) == []
+    (warning,) = Account('log', 979, {NOT_FINITE: 11, 'at rest': 10}).warnings
+    assert warning == '11 of 1000 samples (1 %) are dropped: not finite'
+
+
+@given(st.lists(st.sets(st.sampled_from('abc')), min_size=1), st.dictionaries(st.sampled_from('ad'), st.integers(1, 9)))
+def test_the_first_reason_that_holds_counts(held, earlier):
+    reasons = {reason: np.array([reason in each for each in held]) for reason in 'abc'}
+    found = account('log', reasons, earlier)
+    first = [min(each, default='') for each in held]
+    wanted = {reason: first.count(reason) + earlier.get(reason, 0) for reason in 'abcd'}
+    assert found.left_out == {reason: count for reason, count in wanted.items() if count}
+    assert (found.used, found.total) == (first.count(''), len(held) + sum(earlier.values()))
 
 
 @given(st.integers(0, 50), st.lists(st.integers(0, 3999), max_size=30), st.integers(1, 9))
@@ -82,5 +99,6 @@ def test_used_and_dropped_samples_are_all_samples(dropped, missing, pressures):
     signals = Signals(np.arange(4000) * 0.01, 0.02 * side, pressure, 0.0 * pressure, force)
     log = RecordedLog('log', signals, Sliding(), dropped={SAME_STAMP: dropped} if dropped else {})
     prepared = prepare_logs([log], ['a'])
-    assert prepared.total == {'log': 4000 + dropped}
-    assert sum(prepared.used.values()) + sum(prepared.left_out.values()) == 4000 + dropped
+    (samples,) = prepared.accounts
+    assert (samples.name, samples.total) == ('log', 4000 + dropped)
+    assert samples.left_out.get(SAME_STAMP, 0) == dropped

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from seal_friction_ros.core.identification.admission import Account
 from seal_friction_ros.core.identification.prepare_readings import (
     prepare_logs,
     prepare_manual_readings,
@@ -35,7 +36,7 @@ def test_manual_readings_get_the_sign_of_their_direction_and_every_seal_the_pres
     assert readings.force[:4].tolist() == [9.5, -9.5, 20.0, -20.0]
     assert readings.level.tolist() == [0, 0, 1, 1, 2, 2] * 2
     assert prepared.chamber_pressures.tolist() == [[p, p] for p in readings.at.pressure[:, 0]]
-    assert (prepared.breakaway, prepared.used, prepared.total) == (None, {'sheet': 12}, {'sheet': 12})
+    assert (prepared.breakaway, prepared.accounts) == (None, (Account('sheet', 12, {}),))
     assert not readings.are_samples
 
 
@@ -102,8 +103,9 @@ def test_each_stroke_of_a_log_is_a_reading_of_the_chamber_of_each_seal():
     assert readings.force == pytest.approx(OFFSET + np.tile([1.0, -1.0], 3) * sizes)
     assert readings.level.tolist() == readings.group.tolist() == [0, 0, 1, 1, 2, 2]
     assert [len(samples) for samples in readings.samples] == [len(readings.samples[0])] * 6
-    assert prepared.used == {'log': sum(len(samples) for samples in readings.samples)}
-    assert prepared.total == {'log': 6 * 190}
+    (samples,) = prepared.accounts
+    assert samples.used == sum(len(each) for each in readings.samples)
+    assert samples.total == 6 * 190
 
 
 def test_each_start_from_rest_is_a_breakaway_reading_of_the_level_it_is_at():
@@ -119,17 +121,18 @@ def test_whole_files_are_left_out_if_each_has_most_of_the_pressures():
     assert prepared.readings.left_out_by == 'file'
     assert prepared.readings.group.tolist() == prepared.breakaway.group.tolist() == [0] * 6 + [1] * 6
     assert prepared.readings.names == ('one', 'two')
-    assert set(prepared.used) == set(prepared.total) == {'one', 'two'}
+    assert [samples.name for samples in prepared.accounts] == ['one', 'two']
 
 
 def test_what_is_not_used_is_counted_by_its_reason():
     one = log((5, 15, 30))
     one.signals.force_sum[[7, 8, 120]] = np.nan
     prepared = prepare_logs([one], ('a',))
-    assert sum(prepared.left_out.values()) + sum(prepared.used.values()) == 6 * 190
-    assert prepared.left_out['not finite'] == 3
+    (samples,) = prepared.accounts
+    assert samples.total == 6 * 190
+    assert samples.left_out['not finite'] == 3
     still = np.abs(one.signals.velocity) <= 3e-3
-    assert prepared.left_out['at rest'] == np.count_nonzero(still & np.isfinite(one.signals.force_sum))
+    assert samples.left_out['at rest'] == np.count_nonzero(still & np.isfinite(one.signals.force_sum))
 
 
 def test_a_swept_log_gives_samples_in_ten_blocks_and_too_few_are_refused():
@@ -194,12 +197,13 @@ def test_samples_are_counted_once_by_the_first_reason():
     prepared = prepare_logs([one], ('a',))
     speed = np.abs(one.signals.velocity)
     moving, even = speed > 3e-3, np.abs(np.gradient(one.signals.velocity, 0.01)) < 0.05
-    used = sum(prepared.used.values())
-    assert prepared.left_out == {
+    (samples,) = prepared.accounts
+    used = samples.used
+    assert samples.left_out == {
         'at rest': np.count_nonzero(~moving),
         'accelerated': np.count_nonzero(moving & ~even),
     } | ({'in no even stroke': np.count_nonzero(moving & even) - used} if (moving & even).sum() > used else {})
-    assert sum(prepared.left_out.values()) + used == len(speed)
+    assert samples.total == len(speed)
 
 
 def even_log(name, count, bar=20.0, warm=True):

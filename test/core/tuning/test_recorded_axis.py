@@ -8,6 +8,7 @@ import pytest
 from harness.compensation import COMPENSATING
 
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.identification.admission import Account
 from seal_friction_ros.core.messages.records import Status
 from seal_friction_ros.core.tuning.recorded_axis import (
     RecordedLaw,
@@ -206,8 +207,9 @@ def test_the_largest_hundredth_of_the_frictions_is_noise(share, counts):
 
 def test_what_remains_counts_where_the_rod_slides_and_near_a_reversal():
     law = RecordedLaw(
-        1.0, 0.0, 0.0, False, 0.0, np.array([3.0, 5.0, 9.0, np.nan]), np.array([True, True, False, False])
-    )
+        1.0, 0.0, 0.0, False, 0.0, np.array([3.0, 5.0, 9.0, np.nan]), np.array([True, True, False, False]),
+        Account('', 2, {'at rest': 2}),
+    )  # fmt: skip
     left = residual(law, np.array([False, True, True, True]), np.array([0.0, 1.0, 0.0, 0.0]))
     assert left == pytest.approx((math.sqrt((9.0 + 16.0) / 2.0), 4.0))
     assert residual(law, np.zeros(4, bool), np.zeros(4)).reversal == 0.0
@@ -431,7 +433,7 @@ def test_a_recording_that_is_mostly_noise_leaves_smoothing_and_slew_limit():
 def test_the_next_lower_slew_limit_costs_more_than_a_twentieth_of_the_force():
     made = recording()
     often = np.repeat(np.arange(len(TIME)), np.where(np.arange(len(TIME)) % 50 == 0, 2, 1))  # stamps that come twice
-    twice = Recording(*(column[often] for column in made))
+    twice = Recording(*(column[often] for column in made[:-1]))
     for each in (made, twice):
         found = tune_recorded_axis(each, SETTINGS, KNOWN).feedforward
         free = feedforward_force(dataclasses.replace(found, slew_limit=1e9), each)

@@ -1,11 +1,18 @@
-"""Every row of a damaged log is used, or left out with a reason, in the JSON of ``identify`` and of ``import log``."""
+"""Every sample of damaged logs and bags is used, or left out with a reason, in the JSON of each command."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
+from harness.closed_loop_bags import write_closed_loop
+from harness.example_bags import rewrite
 from harness.identify_run import Run
+from harness.standard_bags import MAPPING, write_standard
 
+from seal_friction_ros.core.messages.coder import decode, encode
+from seal_friction_ros.core.messages.layouts import VELOCITY_TYPE
+from seal_friction_ros.offline.bags.bag import BagMessage, BagWriter, read_messages
 from seal_friction_ros.offline.commands.main import main
 
 RIG = """name: rig
@@ -64,3 +71,70 @@ def test_every_row_of_a_damaged_log_is_used_or_left_out_with_a_reason(seed, tmp_
         (used,), (total,) = figures['samples_used'].values(), figures['samples_total'].values()
         assert used + sum(figures['samples_left_out'].values()) == total
         assert total == (len(made) if source[0] == str(log) else imported['rows'])
+
+
+@pytest.fixture(scope='module')
+def axis(tmp_path_factory):
+    return write_closed_loop(tmp_path_factory.mktemp('source') / 'run', scales=(0.0,), seconds=2.0)
+
+
+def damaged_bag(source: Path, folder: Path, seed: int) -> Path:
+    """The signals as standard messages; some velocities are no numbers, repeat or go back in time, or are cut short."""
+    rng = np.random.default_rng(seed)
+
+    def chosen(bag: Path, kind: str) -> list[int]:
+        places = [i for i, message in enumerate(read_messages(bag)) if message.type_name == kind]
+        return rng.choice(places[1:], int(rng.integers(1, len(places) // 40)), replace=False).tolist()
+
+    missing, again, back = (chosen(source, VELOCITY_TYPE) for _ in range(3))
+    before = [0]
+
+    def change(number: int, message: BagMessage) -> BagMessage:
+        if message.type_name != VELOCITY_TYPE:
+            return message
+        record = decode(message.type_name, message.data)
+        if number in missing:
+            record = record._replace(velocity=float('nan'))
+        if number in again:
+            record = record._replace(stamp=before[-1])
+        if number in back:
+            record = record._replace(stamp=before[-1] - 5_000_000)
+        before.append(record.stamp)
+        return message._replace(data=encode(record))
+
+    foreign = write_standard(rewrite(source, folder / 'own', change), folder / 'foreign')
+    short = chosen(foreign, 'sensor_msgs/msg/JointState')
+    late = int(rng.integers(1, 200))
+    with BagWriter(folder / 'damaged') as writer:
+        for number, message in enumerate(read_messages(foreign)):
+            if message.topic != '/p_a' or number > late:
+                writer.write(*message._replace(data=message.data[:7] if number in short else message.data))
+    return folder / 'damaged'
+
+
+def count_of(bag: Path, *, topic: str) -> int:
+    return sum(message.topic == topic for message in read_messages(bag))
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_every_message_of_a_damaged_bag_is_used_or_left_out_with_a_reason(seed, axis, tmp_path, capsys):
+    made, bag, out = damaged_bag(axis, tmp_path, seed), str(tmp_path / 'bag'), str(tmp_path / 'out')
+    (tmp_path / 'robot.yaml').write_text(MAPPING)
+    used = {}
+    for name, words in {
+        'import': ['import', 'bag', str(made), '--mapping', str(tmp_path / 'robot.yaml'), '--out', bag],
+        'identify': ['identify', bag, '--largest-acceleration', '100', '--out', f'{out}.yaml'],
+        'tune': ['tune', '--bag', bag, '--out', f'{out}_feedforward.yaml'],
+        'health': ['health', bag],
+    }.items():
+        assert main([*words, '--json']) == 0
+        figures = json.loads(capsys.readouterr().out)
+        figures = {'import': lambda f: f['axis'], 'health': lambda f: f['bags'][0]}.get(name, lambda f: f)(figures)
+        counts = [figures[key] for key in ('samples_used', 'samples_total')]
+        used[name], total = (one['bag'] if isinstance(one, dict) else one for one in counts)
+        topic = '/joint_states' if name == 'import' else '/rod_velocity'
+        assert total == count_of(made if name == 'import' else Path(bag), topic=topic)
+        assert used[name] + sum(figures['samples_left_out'].values()) == total
+        assert min(figures['samples_left_out'].values()) > 0
+    assert used['import'] == count_of(Path(bag), topic='/rod_velocity')
+    assert 0 < used['identify'] < used['import']
