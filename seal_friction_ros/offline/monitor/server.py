@@ -12,7 +12,7 @@ import logging
 import re
 import socket
 import threading
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterable
 from contextlib import suppress
 from http import HTTPStatus
 from typing import Any
@@ -52,13 +52,16 @@ class MonitorServer:
         view: What to show.
         port: Port; 0: any free one.
         token: That every request needs; empty: a new one.
+        work: Done step by step while nothing is asked for.
 
     Raises:
         ValueError: The port is in use.
     """
 
-    def __init__(self, view: LiveView | RecordedView, port: int = 0, token: str = '') -> None:
-        self.shown = view
+    def __init__(
+        self, view: LiveView | RecordedView, port: int = 0, token: str = '', work: Iterable[None] = ()
+    ) -> None:
+        self.shown, self._work = view, work
         self.token = token or new_token()
         self.page, self.policy = make_page()
         self.streams = 0
@@ -98,11 +101,17 @@ class MonitorServer:
         server.add_sockets([self.socket])
         self._loop = asyncio.get_running_loop()
         self._is_ready.set()
+        working = asyncio.create_task(self._do_work())
         try:
             await self._stopping.wait()
         finally:
+            working.cancel()
             server.stop()
             await server.close_all_connections()
+
+    async def _do_work(self) -> None:
+        for _ in self._work:
+            await asyncio.sleep(0)
 
     def start(self) -> None:
         """Serve in the background."""

@@ -92,8 +92,11 @@ def _compare_runs(a: Path, b: Path, out: Path, namespace: str, mapping: MappingF
     runs = tuple(_read(path, name, namespace, mapping) for path, name in zip((a, b), names, strict=True))
     changes = common_changes(runs[0].levels, runs[1].levels)
     starts = common_changes(runs[0].breakaway, runs[1].breakaway)
-    told = [mean_change('sliding friction', changes), mean_change('breakaway force', starts)]
-    told.append(_tracking_change(runs[0].tracking, runs[1].tracking))
+    told = (
+        mean_change('sliding friction', changes),
+        mean_change('breakaway force', starts),
+        _tracking_change(runs[0].tracking, runs[1].tracking),
+    )
     known = [one for one in told if one is not None]
     plots = [_pressure_figure(runs, changes), _velocity_figure(runs)]
     facts = [
