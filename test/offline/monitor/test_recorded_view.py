@@ -11,6 +11,7 @@ from harness.browser import chromium
 from harness.closed_loop_bags import START, write_closed_loop
 from harness.example_bags import rewrite, write_inputs, write_recorded
 from harness.monitor_process import shown
+from harness.page_in_browser import violations
 from paths import ROOT
 
 from seal_friction_ros.core.friction.states import FrictionState
@@ -178,6 +179,19 @@ def test_the_page_shows_how_far_a_bag_has_been_read_and_follows(loop: Path):
             may_read.set()
             page.wait_for('!byId("clock").textContent.includes("read to")')
             assert page.value(drawn) > 900.0 > early
+    finally:
+        server.stop()
+
+
+@pytest.mark.skipif(not chromium(), reason='no Chromium: apt-get install chromium')
+def test_the_view_of_a_bag_is_for_people_without_a_mouse_too():
+    view = RecordedView(ROOT / 'bags' / 'faults').load()
+    server = MonitorServer(view)
+    server.start()
+    try:
+        with shown(server.url, 1400) as page:
+            page.wait_for('byId("marks").children.length && columns.time.length')
+            assert violations(page) == []
     finally:
         server.stop()
 

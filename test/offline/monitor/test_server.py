@@ -11,6 +11,8 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
+from harness.browser import chromium
+from harness.page_in_browser import tab, violations
 
 from seal_friction_ros.core.messages.records import NO_ESTIMATE, Velocity
 from seal_friction_ros.offline.monitor.actuator_view import COLUMNS
@@ -236,6 +238,20 @@ def test_a_change_that_is_too_large_is_not_taken():
         # It is closed before it took the body: the answer may be lost with it.
         assert ask(server, '/change', body={'actuator': 'x' * 5000, 'parameter': 'scale', 'value': 1.0})[0] == 400
     assert not asked
+
+
+@pytest.mark.skipif(not chromium(), reason='no Chromium: apt-get install chromium')
+def test_the_live_view_is_for_people_without_a_mouse_too_with_off_and_without_a_connection():
+    switched = view_of(('/one', '/other'), lambda wanted: [Answer(node == '/one', f'OFF: {node}') for node in wanted])
+    with tab(1400) as page:
+        with served(switched) as server:
+            page.open(server.url)
+            page.wait_for('now && tabs.children.length')
+            page.value('pressOff()')
+            page.wait_for('byId("off-answer").className === "no"')
+            assert violations(page) == []
+        page.wait_for('isLost()')
+        assert violations(page) == []
 
 
 def test_a_view_that_only_reads_changes_nothing_and_says_so():
