@@ -39,9 +39,8 @@ from seal_friction_ros.offline.monitor.actuator_view import (
     serious_words,
     situation,
 )
-from seal_friction_ros.offline.monitor.live_view import CHANGEABLE, RATE
+from seal_friction_ros.offline.monitor.live_view import RATE
 from seal_friction_ros.offline.monitor.node_view import NodeView
-from seal_friction_ros.offline.monitor.off_latch import Answer
 
 MOST_ROWS = 120_000  # of an actuator, 20 minutes at full pace; a longer bag has rows further apart (our choice)
 _ROWS_A_MOMENT = 10  # rows from one moment whose words are kept to the next
@@ -271,24 +270,6 @@ class RecordedView:
         found = [*self._failure, *track.findings(held, is_end=is_end)]
         now = self._first + round(time * 1e9)
         return situation(known, held, recent_bits(reversed(rows), time), now, findings=found)
-
-    def change(self, _label: str, parameter: str, _value: float) -> list[Answer]:
-        """A bag cannot be changed.
-
-        Raises:
-            ValueError: There is no such parameter.
-        """
-        if parameter not in CHANGEABLE:
-            raise ValueError(f'parameter {parameter!r}: one of {", ".join(CHANGEABLE)}')
-        return [Answer(False, 'this is a recording: nothing is changed')]
-
-    def off(self) -> list[Answer]:
-        """Nothing in a bag can be switched off."""
-        return [Answer(False, 'this is a recording: nothing is switched off')]
-
-    def lift(self) -> list[Answer]:
-        """Nothing in a bag is switched off."""
-        return self.off()
 
 
 def _nodes(bag: Path, types: dict[str, str], *, has_recorded: bool) -> list[tuple[NodeView, set[str]]]:

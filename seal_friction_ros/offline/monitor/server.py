@@ -165,9 +165,10 @@ class _Handler(RequestHandler):
     async def post(self) -> None:
         """A change."""
         shown = self.server.shown
-        await self._answer(
-            {'/change': self._change, '/off': lambda: self._act(shown.off), '/lift': lambda: self._act(shown.lift)}
-        )
+        if isinstance(shown, RecordedView):
+            raise RefusalError(HTTPStatus.BAD_REQUEST, 'this is a recording: nothing is changed')
+        acts = {'/off': lambda: self._act(shown.off), '/lift': lambda: self._act(shown.lift)}
+        await self._answer({'/change': lambda: self._change(shown), **acts})
 
     async def _answer(self, routes: dict[str, Callable[[], Awaitable[None]]]) -> None:
         if self.request.path not in routes:
@@ -220,14 +221,14 @@ class _Handler(RequestHandler):
             due = max(due + FRAME_PERIOD, loop.time() - FRAME_PERIOD)  # up to one frame is made up for
             await asyncio.sleep(due - loop.time())
 
-    async def _change(self) -> None:
+    async def _change(self, shown: LiveView) -> None:
         asked = self._body()
         label, parameter, value = (asked.get(name) for name in ('actuator', 'parameter', 'value'))
         is_number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e15
         if not (isinstance(label, str) and isinstance(parameter, str) and is_number):
             raise RefusalError(HTTPStatus.BAD_REQUEST, 'give actuator, parameter and a finite value')
         try:
-            await self._act(lambda: self.server.shown.change(label, parameter, float(value or 0.0)))
+            await self._act(lambda: shown.change(label, parameter, float(value or 0.0)))
         except ValueError as error:
             raise RefusalError(HTTPStatus.BAD_REQUEST, str(error)) from None
 

@@ -4,6 +4,8 @@ import shutil
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
 
 import numpy as np
 import pytest
@@ -259,9 +261,15 @@ def test_a_bag_without_estimates_is_refused_with_what_to_do(tmp_path: Path):
         RecordedView(write_inputs(tmp_path / 'inputs', 20))
 
 
-def test_a_bag_cannot_be_changed(tmp_path: Path):
-    view = RecordedView(write_recorded(tmp_path)).load()
-    assert not view.off()[0].confirmed
-    assert not view.change('', 'scale', 0.0)[0].confirmed
-    with pytest.raises(ValueError, match='parameter'):
-        view.change('', 'seals', 0.0)
+@pytest.mark.parametrize('path', ['change', 'off', 'lift'])
+def test_a_bag_cannot_be_changed(tmp_path: Path, path: str):
+    server = MonitorServer(RecordedView(write_recorded(tmp_path)))
+    server.start()
+    try:
+        head = {'Content-Type': 'application/json'}
+        request = Request(server.url.replace('/?', f'/{path}?'), data=b'{}', headers=head)  # noqa: S310  our own server
+        with pytest.raises(HTTPError) as refused:
+            urlopen(request)  # noqa: S310
+        assert (refused.value.code, refused.value.read()) == (400, b'this is a recording: nothing is changed')
+    finally:
+        server.stop()
