@@ -52,4 +52,4 @@ def test_the_tables_of_the_demo_fit():
 def test_in_a_pipe_there_are_no_escape_codes_and_no_long_lines(words: tuple[str, ...]):
     text = printed([sys.executable, '-m', 'seal_friction_ros', *words], TERM='xterm-256color')
     assert '\x1b' not in text
-    assert max(map(len, text.splitlines())) <= COLUMNS + 20  # a path or a name of a type is not broken
+    assert max(map(len, text.splitlines())) <= COLUMNS

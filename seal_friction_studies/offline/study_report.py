@@ -14,7 +14,7 @@ from seal_friction_ros.core.foundation.units import MM, MPA, MS, UM
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports.figure_style import Plot, house_style
 from seal_friction_ros.offline.reports.formatting import number
-from seal_friction_ros.offline.reports.lubrication_report import shades, write_case_page
+from seal_friction_ros.offline.reports.lubrication_report import write_case_page
 from seal_friction_ros.offline.reports.page import Table, head_of, write_page
 from seal_friction_studies.core.findings import REFERENCE_HALF_WIDTH
 from seal_friction_studies.core.spool import SpoolResult
@@ -240,14 +240,15 @@ def study_figure(study: StudyRuns) -> Plot:
     title = f'Friction over solid shear stress agrees within {agreement:.0f} %'
     figure, (left, right) = style.new_figure(title, 4.4, ncols=2)
     stresses = [run.case.seal.solid_shear_stress / MPA for run in study.runs]
-    for run, stress, look in zip(study.runs, stresses, shades(stresses, 'MPa', 0.15), strict=True):
+    looks = style.shades([f'{stress:g} MPa' for stress in stresses])
+    for run, stress, look in zip(study.runs, stresses, looks, strict=True):
         last = last_cycle(run)
         x, friction = run.position[last] / MM, run.friction[last]
-        left.plot(x, friction, color=style.BLUE, lw=1.2, **look)
-        right.plot(x, friction / stress, color=style.BLUE, lw=1.2, **look)
+        left.plot(x, friction, lw=1.2, **look)
+        right.plot(x, friction / stress, lw=1.2, **look)
     left.set(xlabel=POSITION_LABEL, ylabel=FRICTION_LABEL)
     right.set(xlabel=POSITION_LABEL, ylabel='friction over solid shear stress [N/MPa]')
-    style.legend_above(right)
+    style.legend_below(figure, left, len(study.runs))
     return Plot('solid_shear_stress', figure)
 
 

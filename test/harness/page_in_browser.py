@@ -4,6 +4,7 @@ import atexit
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -42,9 +43,32 @@ NOT_READ_ALOUD = """[
   ...[...document.querySelectorAll('img')].filter(e => !e.alt).map(e => e.closest('figure').id)]"""
 WIDE = """[...document.querySelectorAll('main *')].filter(e => e.getBoundingClientRect().right > innerWidth + 1)
   .map(e => e.outerHTML.slice(0, 80))"""
+VIOLATIONS = """axe.run(document, {resultTypes: ['violations']}).then(found => found.violations.flatMap(
+  one => one.nodes.map(node => `${one.id}: ${node.html.slice(0, 80)}`)))"""
+KIND = "document.querySelector('meta[name=generator]').content"
 CHECKS = {
     'cut': CUT, 'letter by letter': LETTERS, 'too small': SMALL, 'not drawn': UNDRAWN, 'not read aloud': NOT_READ_ALOUD,
 }  # fmt: skip
+
+
+_kinds: set[str] = set()  # of pages that `violations` has seen in this process
+
+
+@cache
+def axe() -> str:
+    """The script axe-core, which finds what hinders people who cannot see well or use no mouse."""
+    (folder,) = find_spec('axe_core_python').submodule_search_locations
+    return (Path(folder) / 'axe.min.js').read_text(encoding='utf-8')
+
+
+def violations(tab: Page) -> list[str]:
+    """What axe-core finds on an open page, light and dark."""
+    tab.value(axe())
+    found = []
+    for scheme in ('dark', 'light'):
+        tab.call('Emulation.setEmulatedMedia', features=[{'name': 'prefers-color-scheme', 'value': scheme}])
+        found += [f'{scheme}: {one}' for one in tab.value(VIOLATIONS)]
+    return found
 
 
 @cache
@@ -84,7 +108,10 @@ def opened(path: Path, width: int) -> Page:
 
 
 def check_in_browser(path: Path) -> None:
-    """Nothing overflows, is cut, too small or undrawn; no complaint on the console; nothing is loaded."""
+    """Nothing overflows, is cut, too small or undrawn; no complaint on the console; nothing is loaded.
+
+    The first page of each kind in a process goes through `violations`, too, which takes some seconds.
+    """
     assert path.stat().st_size < LARGEST
     if shared_page() is None:
         return
@@ -93,6 +120,9 @@ def check_in_browser(path: Path) -> None:
         found = {'overflow': tab.overflow, 'complaints': tab.complaints}
         found |= {name: tab.value(script) for name, script in CHECKS.items()}
         found['requests'] = [url for url in tab.requests if not url.startswith('data:')][1:]
+        if width == WIDTHS[0] and (kind := tab.value(KIND)) not in _kinds:
+            _kinds.add(kind)
+            found['violations'] = violations(tab)
         wrong = {name: value for name, value in found.items() if value}
         assert not wrong, f'{path} at {width} px: {wrong}'
     assert not (wide := wide_on_paper(opened(path, PAPER))), f'{path} on paper: {wide}'

@@ -63,6 +63,10 @@ class BagError(ValueError):
     """A bag that cannot be read or written; one line that says which and why."""
 
 
+class DamagedError(BagError):
+    """A bag whose files are not whole; ``seal_friction recover`` makes a bag of what can be read."""
+
+
 @contextmanager
 def named(bag: Path, message: BagMessage) -> Iterator[None]:
     """Convert the error of a message to one that names it."""
@@ -456,7 +460,8 @@ def _as_bag_errors(path: Path) -> Iterator[None]:
         raise
     except (OSError, *mcap_reader.ERRORS, sqlite3.Error) as error:
         reason = ' '.join(str(error).split()) or type(error).__name__
-        raise BagError(f'{path}: not a readable bag: {reason}') from None
+        kind = BagError if isinstance(error, OSError | sqlite3.Error) else DamagedError
+        raise kind(f'{path}: not a readable bag: {reason}') from None
 
 
 def storage(path: Path) -> Storage:

@@ -4,6 +4,8 @@ from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import fill
+from typing import Any
 
 from seal_friction_ros.core.foundation.stamps import StampRepair
 from seal_friction_ros.core.friction.states import FrictionState
@@ -16,6 +18,9 @@ from seal_friction_ros.core.messages.records import FrictionEstimate, Status
 from seal_friction_ros.core.messages.together import decode_together
 from seal_friction_ros.offline.bags.bag import BagError, BagMessage, bag_topics, named, read_definitions
 from seal_friction_ros.offline.bags.mapped_bag import MappingFile, machine_messages
+
+_WIDTH = 80  # characters of a line
+_WHOLE_NAMES: dict[str, Any] = {'subsequent_indent': '    ', 'break_long_words': False, 'break_on_hyphens': False}
 
 
 @dataclass(frozen=True)
@@ -43,7 +48,8 @@ class BagInfo:
             f'  {topic}: {", ".join(f"{count} {what}" for what, count in found.items() if count)}'
             for topic, found in self.stamps.items()
         ]
-        return '\n'.join([*lines, *(f'  {title}: {", ".join(values)}' for title, values in texts.items() if values)])
+        lines += [f'  {title}: {", ".join(values)}' for title, values in texts.items() if values]
+        return '\n'.join(fill(line, _WIDTH, **_WHOLE_NAMES) for line in lines)
 
 
 def bag_info(bag: Path, mapping: MappingFile | None = None) -> BagInfo:

@@ -3,7 +3,6 @@
 import argparse
 import os
 import sys
-import threading
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -56,8 +55,7 @@ def _show_bag(arguments: argparse.Namespace) -> int:
 
     token = kept_token(arguments.token_file) if arguments.token_file else ''
     view = RecordedView(arguments.bag, cli.mapping_of(arguments))
-    server = MonitorServer(view, arguments.port, token)
-    threading.Thread(target=view.load, daemon=True).start()
+    server = MonitorServer(view, arguments.port, token, view.read())
     print(server.told(as_json=arguments.json), flush=True)
     server.serve()
     return cli.SUCCESS

@@ -43,10 +43,13 @@ class NodeView:
     Args:
         node: Its name with its namespace.
         definitions_of: Looks up the definitions of the messages of a machine.
-        remembered: So long what was seen counts for the findings [s]; our choice.
+        remembered: So long what was seen counts for the findings [s]; our choice. Infinite: a recorded run.
+        has_recorded: As of `TrackingFollower`.
     """
 
-    def __init__(self, node: str, definitions_of: DefinitionsOf, remembered: float = 3600.0) -> None:
+    def __init__(
+        self, node: str, definitions_of: DefinitionsOf, remembered: float = 3600.0, *, has_recorded: bool = False
+    ) -> None:
         self.node = node
         self.known: dict[str, Known] = {}
         """configuration of each actuator"""
@@ -64,7 +67,7 @@ class NodeView:
         self._definitions_of = definitions_of
         self._machine: Machine | None = None
         self._translation: Translation | None = None
-        self._remembered = remembered
+        self._remembered, self._has_recorded = remembered, has_recorded
         self._followers: dict[str, Follower] = {}
         self._tracking: dict[str, TrackingFollower] = {}
         self._had_placeholder: set[str] = set()
@@ -114,7 +117,8 @@ class NodeView:
         self.held = {name: self.held.get(name, NOTHING_HELD) for name in self.known}
         kept = _TRACKED if math.isfinite(self._remembered) else math.inf
         for name, one in snapshot.actuators.items():
-            self._tracking.setdefault(name, TrackingFollower(kept)).configure(one.snapshot)
+            follower = TrackingFollower(kept, has_recorded=self._has_recorded)
+            self._tracking.setdefault(name, follower).configure(one.snapshot)
         self.refused = ''
 
     def hear(self, received: int) -> None:
@@ -191,6 +195,7 @@ class NodeView:
             has_placeholder = known.has_placeholder or (is_recorded and actuator in self._had_placeholder)
             found = findings_of(seen, has_placeholder=has_placeholder, uses_scale=known.adaptation == 'on')
             if until is None and actuator in self._tracking:
-                found = [*raised(self._tracking[actuator].evaluation()), *found]
+                tracking = self._tracking[actuator]
+                found = [*raised(tracking.evaluation(), None if is_recorded else tracking.acting), *found]
             self._found[actuator] = key, found
         return self._found[actuator][1]

@@ -1,7 +1,6 @@
 """The view of a bag: the same rows and words as live, at any moment of the recording that has been read."""
 
 import math
-import threading
 import time
 from array import array
 from collections.abc import Iterable, Iterator
@@ -18,6 +17,7 @@ from seal_friction_ros.offline.bags.actuator_bag import RECORDED
 from seal_friction_ros.offline.bags.bag import (
     BagError,
     BagMessage,
+    DamagedError,
     bag_end,
     bag_topics,
     read_definitions,
@@ -39,16 +39,15 @@ from seal_friction_ros.offline.monitor.actuator_view import (
     serious_words,
     situation,
 )
-from seal_friction_ros.offline.monitor.live_view import CHANGEABLE, RATE
+from seal_friction_ros.offline.monitor.live_view import RATE
 from seal_friction_ros.offline.monitor.node_view import NodeView
-from seal_friction_ros.offline.monitor.off_latch import Answer
 
 MOST_ROWS = 120_000  # of an actuator, 20 minutes at full pace; a longer bag has rows further apart (our choice)
 _ROWS_A_MOMENT = 10  # rows from one moment whose words are kept to the next
 _MOST_ROWS_AT_ONCE = 12_000  # in one answer to the page
 _MOST_MARKS = 200  # on the slider
 _PARTS = 800  # of the overview
-_SLICE, _PAUSE = 0.02, 0.001  # [s] reading, and the page may ask (our choice)
+_SLICE = 0.005  # [s] of reading, after which the page may ask (our choice)
 _CONFIGURATION = '/configuration'
 _SERIOUS = sum(map(int, STATUS_WORDS)) & ~int(USUAL)
 
@@ -134,7 +133,7 @@ def _as_row(values: 'array[float]') -> Row:
 
 
 class RecordedView:
-    """A bag, sampled at the pace of the live view: to its first estimate at once, the rest by `load`.
+    """A bag, sampled at the pace of the live view: to its first estimate at once, the rest by `read` or `load`.
 
     Args:
         bag: The bag.
@@ -146,7 +145,7 @@ class RecordedView:
     """
 
     def __init__(self, bag: Path, mapping: MappingFile | None = None) -> None:
-        self._bag, self._lock = bag, threading.Lock()
+        self._bag = bag
         known = bag_topics(bag)
         types = {topic: info.type_name for topic, info in known.items() if info.message_count}
         answers = (ESTIMATE_TYPE, MACHINE_TYPE)
@@ -157,13 +156,14 @@ class RecordedView:
             types[MACHINE_CONFIGURATION] = CONFIGURATION_TYPE
         elif not any(kind in answers for kind in types.values()):
             raise BagError(f'{bag}: no estimates in it: add them with seal_friction replay {bag} --out BAG')
-        self._nodes = _nodes(bag, types)
         self._acted = {topic for topic in known if topic.endswith(RECORDED)}
+        self._nodes = _nodes(bag, types, has_recorded=bool(self._acted))
         self._tracks: dict[str, _Track] = {}
         self._first = next((message.log_time for message in read_messages(bag) if message.log_time), 0)
         self._duration = max((bag_end(bag) - self._first) * 1e-9, 0.0)
         self._period = max(1.0 / RATE, self._duration / MOST_ROWS)
-        self._read_until, self._is_read, self._failure = 0.0, False, ''
+        self._read_until, self._is_read = 0.0, False
+        self._failure: list[Finding] = []
         self._rows = self._sampled(machine_messages(bag, mapping))
         while not self._is_read and not any(track.first < math.inf for track in self._tracks.values()):
             self._read_row()
@@ -172,17 +172,28 @@ class RecordedView:
             raise BagError(f'{bag}: the configuration of the estimator in it cannot be read: {reason}')
 
     def load(self) -> 'RecordedView':
-        """Read the rest, while the page may ask for what has been read; damage ends it, and the page says so."""
+        """Read the rest."""
+        for _ in self.read():
+            pass
+        return self
+
+    def read(self) -> Iterator[None]:
+        """Read the rest, slice by slice: between two the page may ask. An error ends it, and the page says so."""
         try:
             while not self._is_read:
-                with self._lock:
-                    end = time.monotonic() + _SLICE
-                    while not self._is_read and time.monotonic() < end:
-                        self._read_row()
-                time.sleep(_PAUSE)  # else who waits for the lock does not get it
-        except Exception as error:  # noqa: BLE001  of any damage: else the page would wait for the rest for ever
-            self._failure, self._is_read = ' '.join(str(error).split()) or type(error).__name__, True
-        return self
+                end = time.monotonic() + _SLICE
+                while not self._is_read and time.monotonic() < end:
+                    self._read_row()
+                yield
+        except Exception as error:  # noqa: BLE001  of any kind: else the page would wait for the rest for ever
+            self._failure, self._is_read = [self._not_read(error)], True
+
+    def _not_read(self, error: Exception) -> Finding:
+        reason = ' '.join(str(error).split()) or type(error).__name__
+        after = 'mend what it names: what comes after it is not shown'
+        if isinstance(error, DamagedError):
+            after = f'save the rest: seal_friction recover {self._bag}'
+        return Finding(BAD, f'not read to its end: {reason}', after)
 
     def _read_row(self) -> None:
         until = next(self._rows, None)
@@ -226,17 +237,15 @@ class RecordedView:
         name = self._bag.resolve().name
         about = {'mode': 'bag', 'name': name, 'columns': COLUMNS, 'can_change': False, 'start': str(self._first)}
         gap = max(RECENT, 2.0 * self._period, self._duration / _MOST_MARKS)
-        with self._lock:
-            tracks = self._tracks.items()
-            return {
-                **about,
-                'duration': round(self._duration, 3),
-                'period': self._period,
-                'loaded': round(self._duration if self._is_read else self._end, 3),
-                'first': min(*(track.first for _, track in tracks), self._duration),
-                'faults': {label: track.faults(gap) for label, track in tracks},
-                'overview': {label: track.overview() for label, track in tracks},
-            }
+        return {
+            **about,
+            'duration': round(self._duration, 3),
+            'period': self._period,
+            'loaded': round(self._duration if self._is_read else self._end, 3),
+            'first': min(*(track.first for track in self._tracks.values()), self._duration),
+            'faults': {label: track.faults(gap) for label, track in self._tracks.items()},
+            'overview': {label: track.overview() for label, track in self._tracks.items()},
+        }
 
     @property
     def _end(self) -> float:
@@ -244,13 +253,12 @@ class RecordedView:
 
     def view(self, label: str, since: float, until: float | None = None) -> dict[str, Any]:
         """Rows of an actuator in ``since`` to ``until`` [s], and the situation of all at ``until``."""
-        with self._lock:
-            label = label if label in self._tracks else next(iter(self._tracks))
-            end = self._end if until is None else min(max(until, 0.0), self._end)
-            last = round(end / self._period) - 1
-            first = max(math.floor(since / self._period), last - _MOST_ROWS_AT_ONCE)
-            every = {name: self._situation(track, last) for name, track in self._tracks.items()}
-            rows = self._tracks[label].slice(first, max(last, 0))
+        label = label if label in self._tracks else next(iter(self._tracks))
+        end = self._end if until is None else min(max(until, 0.0), self._end)
+        last = round(end / self._period) - 1
+        first = max(math.floor(since / self._period), last - _MOST_ROWS_AT_ONCE)
+        every = {name: self._situation(track, last) for name, track in self._tracks.items()}
+        rows = self._tracks[label].slice(first, max(last, 0))
         return frame(label, end, rows, every, node=self._bag.resolve().name, diagnostics=[])
 
     def _situation(self, track: _Track, last: int) -> dict[str, Any]:
@@ -259,32 +267,12 @@ class RecordedView:
         rows = track.slice(place - 100, place)
         time = rows[-1][0]
         is_end = self._is_read and last >= round(self._end / self._period) - 1
-        found = track.findings(held, is_end=is_end)
-        if self._failure:
-            found = [Finding(BAD, f'not read to its end: {self._failure}', 'use seal_friction recover'), *found]
+        found = [*self._failure, *track.findings(held, is_end=is_end)]
         now = self._first + round(time * 1e9)
         return situation(known, held, recent_bits(reversed(rows), time), now, findings=found)
 
-    def change(self, _label: str, parameter: str, _value: float) -> list[Answer]:
-        """A bag cannot be changed.
 
-        Raises:
-            ValueError: There is no such parameter.
-        """
-        if parameter not in CHANGEABLE:
-            raise ValueError(f'parameter {parameter!r}: one of {", ".join(CHANGEABLE)}')
-        return [Answer(False, 'this is a recording: nothing is changed')]
-
-    def off(self) -> list[Answer]:
-        """Nothing in a bag can be switched off."""
-        return [Answer(False, 'this is a recording: nothing is switched off')]
-
-    def lift(self) -> list[Answer]:
-        """Nothing in a bag is switched off."""
-        return self.off()
-
-
-def _nodes(bag: Path, types: dict[str, str]) -> list[tuple[NodeView, set[str]]]:
+def _nodes(bag: Path, types: dict[str, str], *, has_recorded: bool) -> list[tuple[NodeView, set[str]]]:
     """Estimators of a bag, and the topics of each; no topics: all of them.
 
     An estimator is known by its configuration; without one every topic of estimates is one. Topics belong to the
@@ -298,7 +286,7 @@ def _nodes(bag: Path, types: dict[str, str]) -> list[tuple[NodeView, set[str]]]:
     names = {topic.removesuffix(_CONFIGURATION): topic.removesuffix(_CONFIGURATION) for topic in configured}
     if not names:
         names = {topic: topic for topic, kind in types.items() if kind == ESTIMATE_TYPE}
-    views = [NodeView(name, definitions, math.inf) for name in names]
+    views = [NodeView(name, definitions, math.inf, has_recorded=has_recorded) for name in names]
     if not configured:
         for view in views:
             view.without_configuration()

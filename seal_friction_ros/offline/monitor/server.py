@@ -12,7 +12,7 @@ import logging
 import re
 import socket
 import threading
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterable
 from contextlib import suppress
 from http import HTTPStatus
 from typing import Any
@@ -52,13 +52,16 @@ class MonitorServer:
         view: What to show.
         port: Port; 0: any free one.
         token: That every request needs; empty: a new one.
+        work: Done step by step while nothing is asked for.
 
     Raises:
         ValueError: The port is in use.
     """
 
-    def __init__(self, view: LiveView | RecordedView, port: int = 0, token: str = '') -> None:
-        self.shown = view
+    def __init__(
+        self, view: LiveView | RecordedView, port: int = 0, token: str = '', work: Iterable[None] = ()
+    ) -> None:
+        self.shown, self._work = view, work
         self.token = token or new_token()
         self.page, self.policy = make_page()
         self.streams = 0
@@ -98,11 +101,17 @@ class MonitorServer:
         server.add_sockets([self.socket])
         self._loop = asyncio.get_running_loop()
         self._is_ready.set()
+        working = asyncio.create_task(self._do_work())
         try:
             await self._stopping.wait()
         finally:
+            working.cancel()
             server.stop()
             await server.close_all_connections()
+
+    async def _do_work(self) -> None:
+        for _ in self._work:
+            await asyncio.sleep(0)
 
     def start(self) -> None:
         """Serve in the background."""
@@ -156,9 +165,10 @@ class _Handler(RequestHandler):
     async def post(self) -> None:
         """A change."""
         shown = self.server.shown
-        await self._answer(
-            {'/change': self._change, '/off': lambda: self._act(shown.off), '/lift': lambda: self._act(shown.lift)}
-        )
+        if isinstance(shown, RecordedView):
+            raise RefusalError(HTTPStatus.BAD_REQUEST, 'this is a recording: nothing is changed')
+        acts = {'/off': lambda: self._act(shown.off), '/lift': lambda: self._act(shown.lift)}
+        await self._answer({'/change': lambda: self._change(shown), **acts})
 
     async def _answer(self, routes: dict[str, Callable[[], Awaitable[None]]]) -> None:
         if self.request.path not in routes:
@@ -211,14 +221,14 @@ class _Handler(RequestHandler):
             due = max(due + FRAME_PERIOD, loop.time() - FRAME_PERIOD)  # up to one frame is made up for
             await asyncio.sleep(due - loop.time())
 
-    async def _change(self) -> None:
+    async def _change(self, shown: LiveView) -> None:
         asked = self._body()
         label, parameter, value = (asked.get(name) for name in ('actuator', 'parameter', 'value'))
         is_number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e15
         if not (isinstance(label, str) and isinstance(parameter, str) and is_number):
             raise RefusalError(HTTPStatus.BAD_REQUEST, 'give actuator, parameter and a finite value')
         try:
-            await self._act(lambda: self.server.shown.change(label, parameter, float(value or 0.0)))
+            await self._act(lambda: shown.change(label, parameter, float(value or 0.0)))
         except ValueError as error:
             raise RefusalError(HTTPStatus.BAD_REQUEST, str(error)) from None
 

@@ -6,9 +6,11 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.findings import (
     BAD,
     GOOD,
+    SMALL_CHANGE,
     USUAL_LIMITS,
     Finding,
     Limits,
@@ -53,12 +55,18 @@ def run_findings(
     return found
 
 
-def raised(tracking: TrackingEvaluation | None) -> Iterator[Finding]:
-    """The finding that the feed-forward raises the tracking error, where it does."""
+def raised(tracking: TrackingEvaluation | None, acting: FeedForwardSettings | None = None) -> Iterator[Finding]:
+    """The finding that the feed-forward raises the tracking error, by more than its noise and than `SMALL_CHANGE`.
+
+    With ``acting`` only that of these settings: what has been set to something else does not act any more.
+    """
     found = tracking.compensated if tracking else None
-    if found is not None and (change := found.rms_change or 0.0) > 0.0:
+    if found is None or acting not in (None, found.settings):
+        return
+    change, noise = found.rms_change or 0.0, found.rms_noise or 0.0
+    if change > max(100.0 * SMALL_CHANGE, noise):
         what = f'the feed-forward raises the tracking error by {change:.1f} % to {found.rms / UM:.0f} µm RMS'
-        yield Finding(BAD, what, f'set feedforward.scale to 0, then {_TUNE}', 0.01 * change)
+        yield Finding(BAD, what, f'set feedforward.scale to 0, then {_TUNE}', 0.01 * change, 0.01 * noise)
 
 
 def bag_findings(bag: Path, chosen: Chosen) -> list[Finding]:

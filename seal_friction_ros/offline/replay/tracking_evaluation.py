@@ -18,6 +18,7 @@ from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.strokes import MAX_GAP
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
+from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.servo.tracking import dwell_per_reversal, reversals, tracking_peak, tracking_rms
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun
@@ -27,7 +28,7 @@ MIN_SAMPLES = 50  # a shorter stretch is not evaluated
 MIN_PERIODS = 2  # of a periodic reference
 HYSTERESIS = 0.1  # of the amplitude: a reference must pass the middle by this much to cross it
 SAME = 0.05  # periods, amplitudes and shapes that differ by a smaller share are the same
-
+PARTS = 10  # of a stretch whose reference has no period, between which the error scatters
 
 _REPLAYED = (
     'The estimates and the feed-forward in this bag are replayed: the replayed feed-forward did not act. The tracking '
@@ -57,6 +58,7 @@ class TrackingStretch:
     amplitude: float  # [m] of the reference, half peak to peak
     period: float | None  # [s] of the reference; None if it is not periodic
     rms: float  # [m] root mean square of the tracking error
+    rms_error: float  # [-] its relative standard error, by its scatter from period to period, or between `PARTS`
     peak: float  # [m] largest tracking error
     reversals: int  # changes of direction of the rod
     dwell: float | None  # [s] mean rest per reversal of the rod; None if it does not reverse
@@ -64,7 +66,8 @@ class TrackingStretch:
     not_sliding: float | None  # [-] share of the estimates of known state that do not slide
     feedforward_peak: float | None  # [N] largest feed-forward that acted; 0.0 without; None if it is not known
     rms_change: float | None = None  # [%] against the first stretch without feed-forward; None if the reference differs
-    dwell_change: float | None = None  # [%] the same of the dwell
+    rms_noise: float | None = None  # [%] change that 95 % of repetitions stay below
+    dwell_change: float | None = None  # [%] as rms_change, of the dwell
 
     @property
     def has_feedforward(self) -> bool | None:
@@ -106,7 +109,7 @@ class _Axis(NamedTuple):
     reference: FloatArray
     state: IntArray
     feedforward_force: FloatArray
-    replayed_force: FloatArray | None
+    is_replay: bool  # then the forces are those of the recording
 
 
 def evaluate_tracking(run: RecordedRun) -> TrackingEvaluation | None:
@@ -115,7 +118,8 @@ def evaluate_tracking(run: RecordedRun) -> TrackingEvaluation | None:
     The longest part of a stretch without a gap in either above `MAX_GAP` is evaluated. Its first ``fade_time`` +
     `SETTLING_TIME` are left out; of a periodic reference, whole periods are evaluated.
     """
-    return _tracking_of(_Axis(*(getattr(run, name) for name in _Axis._fields)), configuration_stretches(run))
+    columns = {name: getattr(run, name) for name in _Axis._fields if name != 'is_replay'}
+    return _tracking_of(_Axis(**columns, is_replay=run.replayed_force is not None), configuration_stretches(run))
 
 
 class TrackingFollower:
@@ -123,17 +127,18 @@ class TrackingFollower:
 
     Args:
         kept: So long a sample counts [s].
+        has_recorded: Whether the forces of a replay are those of the recording; else it is not known what acted.
     """
 
     PERIOD = 0.01  # [s] 20 samples of a period at 5 Hz (our choice)
 
-    def __init__(self, kept: float) -> None:
-        self._kept = kept
+    def __init__(self, kept: float, *, has_recorded: bool = False) -> None:
+        self._kept, self._has_recorded = kept, has_recorded
         self._rows: deque[tuple[float, ...]] = deque()
         self._changes: list[tuple[float, Snapshot]] = []
 
     def configure(self, snapshot: Snapshot) -> None:
-        """Take a configuration; the tracking of a replay is not told: what it computes did not act."""
+        """Take a configuration."""
         begin = self._rows[-1][0] if self._rows else -math.inf
         if not self._changes or snapshot[:1] + snapshot[3:] != self._changes[-1][1][:1] + self._changes[-1][1][3:]:
             self._changes.append((begin, snapshot))
@@ -148,14 +153,22 @@ class TrackingFollower:
         while self._rows[0][0] < row[0] - self._kept:
             self._rows.popleft()
 
+    @property
+    def acting(self) -> FeedForwardSettings | None:
+        """Newest settings of the feed-forward; None if they are not known."""
+        return _acting(self._changes[-1][1]) if self._changes else None
+
     def evaluation(self) -> TrackingEvaluation | None:
         """As of `evaluate_tracking`."""
-        if not self._rows or any(snapshot.recorded is not None for _, snapshot in self._changes):
+        if not self._rows:
             return None
         time, velocity, position, reference, state, force = np.array(self._rows).T
         rows = [int(np.searchsorted(time, begin, side='right')) for begin, _ in self._changes]
         changes = zip([0, *rows], [None, *(snapshot for _, snapshot in self._changes)], strict=True)
-        axis = _Axis(time, velocity, position, reference, state.astype(np.int64), force, None)
+        is_replay = any(snapshot.recorded is not None for _, snapshot in self._changes)
+        if is_replay and not self._has_recorded:
+            force = np.full(len(time), math.nan)
+        axis = _Axis(time, velocity, position, reference, state.astype(np.int64), force, is_replay)
         return _tracking_of(axis, _stretches(list(changes), len(time)))
 
 
@@ -166,7 +179,7 @@ def _tracking_of(run: _Axis, stretches: Iterable[tuple[int, int, Snapshot | None
     found = tuple(stretch for stretch in evaluated if stretch is not None)
     base = TrackingEvaluation(found, ()).without
     compared = tuple(_compared(stretch, base) for stretch in found)
-    notes = [] if run.replayed_force is None else [_REPLAYED]
+    notes = [_REPLAYED] if run.is_replay else []
     return TrackingEvaluation(compared, (*notes, *_notes(compared, base, len(evaluated) - len(found))))
 
 
@@ -198,14 +211,14 @@ def _stretches(
 
 def _evaluate(run: _Axis, first: int, end: int, snapshot: Snapshot | None) -> TrackingStretch | None:
     """Numbers of one stretch; None if it is too short."""
-    settings = (snapshot.recorded or snapshot.configuration).feedforward if snapshot else None
+    settings = _acting(snapshot) if snapshot else None
     estimator_settings = snapshot.configuration.settings if snapshot else EstimatorSettings()
     settling = (settings or FeedForwardSettings()).fade_time + SETTLING_TIME
     part = _longest_part(run, first, end)
     part = part[run.time[part] >= run.time[part[0]] + settling] if len(part) else part
     if len(part) < MIN_SAMPLES or run.time[part[-1]] <= run.time[part[0]]:
         return None
-    repeats = periodicity(run.time[part], run.reference[part])
+    repeats, whole = periodicity(run.time[part], run.reference[part]), PARTS
     if repeats is not None:
         step = float(np.median(np.diff(run.time[part])))
         whole = math.floor(float(run.time[part[-1]] - run.time[part[0]] + step) / repeats.period + 1e-6)
@@ -217,7 +230,7 @@ def _evaluate(run: _Axis, first: int, end: int, snapshot: Snapshot | None) -> Tr
     known = run.state[part][run.state[part] != FrictionState.UNKNOWN]
     force = run.feedforward_force[part]
     force = force[np.isfinite(force)]
-    is_known = run.replayed_force is None or len(force) > 0 or (settings is not None and settings.scale == 0.0)
+    is_known = not run.is_replay or len(force) > 0 or (settings is not None and settings.scale == 0.0)
     return TrackingStretch(
         first=int(part[0]),
         last=int(part[-1]),
@@ -230,6 +243,7 @@ def _evaluate(run: _Axis, first: int, end: int, snapshot: Snapshot | None) -> Tr
         amplitude=float(np.ptp(reference)) / 2.0,
         period=repeats.period if repeats else None,
         rms=tracking_rms(reference, position),
+        rms_error=_rms_error(reference - position, whole),
         peak=tracking_peak(reference, position),
         reversals=turns,
         dwell=dwell,
@@ -237,6 +251,21 @@ def _evaluate(run: _Axis, first: int, end: int, snapshot: Snapshot | None) -> Tr
         not_sliding=1.0 - float(np.mean(known == FrictionState.SLIDING)) if len(known) else None,
         feedforward_peak=float(np.abs(force).max(initial=0.0)) if is_known else None,
     )
+
+
+def _acting(snapshot: Snapshot) -> FeedForwardSettings | None:
+    """Settings of the feed-forward that acted; None if they are not known."""
+    return (snapshot.recorded or snapshot.configuration).feedforward
+
+
+def _rms_error(error: FloatArray, parts: int) -> float:
+    r"""Relative standard error of a root mean square [-], by the scatter of the mean squares :math:`q_i` of its parts.
+
+    .. math:: \frac{s_{rms}}{rms} = \frac{1}{2} \frac{s_q}{\bar q \sqrt{n}}
+    """
+    squares = np.array([float(np.mean(part**2)) for part in np.array_split(error, parts)])
+    mean = float(squares.mean())
+    return 0.5 * float(squares.std(ddof=1)) / math.sqrt(parts) / mean if mean else 0.0
 
 
 def _longest_part(run: _Axis, first: int, end: int) -> IntArray:
@@ -305,7 +334,12 @@ def _same_reference(one: TrackingStretch, other: TrackingStretch) -> bool:
 def _compared(stretch: TrackingStretch, base: TrackingStretch | None) -> TrackingStretch:
     if base is None or stretch is base or not _same_reference(stretch, base):
         return stretch
-    return replace(stretch, rms_change=_change(stretch.rms, base.rms), dwell_change=_change(stretch.dwell, base.dwell))
+    return replace(
+        stretch,
+        rms_change=_change(stretch.rms, base.rms),
+        rms_noise=100.0 * BAND_95 * math.hypot(stretch.rms_error, base.rms_error),
+        dwell_change=_change(stretch.dwell, base.dwell),
+    )
 
 
 def _change(value: float | None, base: float | None) -> float | None:

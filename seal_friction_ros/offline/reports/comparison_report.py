@@ -26,7 +26,15 @@ from seal_friction_ros.offline.reports.bag_figures import PRESSURE_LABEL, usable
 from seal_friction_ros.offline.reports.bag_report import data_date, mounted_seals
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, number
-from seal_friction_ros.offline.reports.page import ReportSummary, Table, head_of, seals_text, write_page
+from seal_friction_ros.offline.reports.page import (
+    Columns,
+    ReportSummary,
+    Table,
+    head_of,
+    seals_text,
+    table_of,
+    write_page,
+)
 
 NOISE = SMALL_CHANGE  # [-] of a change, where too few strokes tell (our choice)
 SAME_PRESSURE = 0.05  # [-] of the highest pressure, by which pressures of both runs may differ (our choice)
@@ -92,8 +100,11 @@ def _compare_runs(a: Path, b: Path, out: Path, namespace: str, mapping: MappingF
     runs = tuple(_read(path, name, namespace, mapping) for path, name in zip((a, b), names, strict=True))
     changes = common_changes(runs[0].levels, runs[1].levels)
     starts = common_changes(runs[0].breakaway, runs[1].breakaway)
-    told = [mean_change('sliding friction', changes), mean_change('breakaway force', starts)]
-    told.append(_tracking_change(runs[0].tracking, runs[1].tracking))
+    told = (
+        mean_change('sliding friction', changes),
+        mean_change('breakaway force', starts),
+        _tracking_change(runs[0].tracking, runs[1].tracking),
+    )
     known = [one for one in told if one is not None]
     plots = [_pressure_figure(runs, changes), _velocity_figure(runs)]
     facts = [
@@ -255,15 +266,11 @@ def _write(
 
 
 def _table(names: tuple[str, str], changes: Sequence[Change]) -> Table:
-    heads = ('pressure [bar]', f'{names[0]} [N]', f'{names[1]} [N]', 'change [%]', 'noise [%]')
-    rows = [
-        (
-            number(one.pressure / BAR),
-            number(one.before),
-            number(one.then),
-            number(100.0 * one.relative, 1, signed=True),
-            number(100.0 * one.noise, 1),
-        )
-        for one in changes
-    ]
-    return Table(heads, rows)
+    columns: Columns = (
+        ('pressure [bar]', lambda one: number(one.pressure, unit=BAR)),
+        (f'{names[0]} [N]', lambda one: number(one.before)),
+        (f'{names[1]} [N]', lambda one: number(one.then)),
+        ('change [%]', lambda one: number(one.relative, 1, unit=0.01, signed=True)),
+        ('noise [%]', lambda one: number(one.noise, 1, unit=0.01)),
+    )
+    return table_of(changes, columns)

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import matplotlib.style
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -114,6 +115,12 @@ def label_panels(axes: Sequence[Axes], xlabel: str, ylabel: str, columns: int = 
         ax.tick_params(labelbottom=True)
     for ax in axes[::columns]:
         ax.set_ylabel(ylabel)
+
+
+def shades(labels: Sequence[str]) -> list[dict[str, Any]]:
+    """Look of the curve of each value: a colour of its own, from dark to light, and its label."""
+    colours = colormaps['viridis'](np.linspace(0.0, 0.85, len(labels)))
+    return [{'color': colour, 'label': label} for colour, label in zip(colours, labels, strict=True)]
 
 
 def legend_below(figure: Figure, ax: Axes, columns: int) -> None:

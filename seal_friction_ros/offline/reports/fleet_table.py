@@ -1,6 +1,6 @@
 """Parquet table of a fleet: a row per bag and pressure level."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,8 @@ from seal_friction_ros.offline.work.atomic_file import write_whole
 from seal_friction_ros.packages import needed
 
 _TEXTS, _COUNTS = ('replay', 'difference', 'next', 'health'), ('messages', 'reversals')
+_OF_BAG = [name for name in BagSummary._fields if name not in ('levels', 'level', 'why')]
+_OF_LEVEL = [f'level_{name}' for name in LEVEL_COLUMNS]
 
 
 def write_fleet_table(bags: Sequence[FleetBag], out: Path) -> None:
@@ -25,19 +27,12 @@ def write_fleet_table(bags: Sequence[FleetBag], out: Path) -> None:
         ValueError: The file cannot be written.
     """
     arrow, parquet = needed('pyarrow'), needed('pyarrow.parquet')
-    of_bag = [name for name in BagSummary._fields if name not in ('levels', 'level', 'why')]
-    types = {name: arrow.string() if name in _TEXTS else arrow.float64() for name in of_bag}
-    types |= dict.fromkeys(_COUNTS, arrow.int64())
-    columns: dict[str, list[Any]] = {name: [] for name in ('bag', 'level', 'why', *of_bag, *_level_names())}
-    for bag in bags:
-        for level in _levels(bag.summary):
-            values = [getattr(bag.summary, name, None) for name in of_bag]
-            row = (str(bag.path), bag.level, bag.why, *values, *level)
-            for column, value in zip(columns.values(), row, strict=True):
-                column.append(_storable(value))
-    fields = [arrow.field(name, types.get(name, _type_of(arrow, name))) for name in columns]
+    kinds = dict.fromkeys(('bag', 'level', 'why', *_TEXTS), arrow.string()) | dict.fromkeys(_COUNTS, arrow.int64())
+    names = ('bag', 'level', 'why', *_OF_BAG, *_OF_LEVEL)
+    schema = arrow.schema([(name, kinds.get(name, arrow.float64())) for name in names])
     buffer = BytesIO()
-    parquet.write_table(arrow.table(columns, schema=arrow.schema(fields)), buffer, compression='zstd')
+    table = arrow.Table.from_pylist([row for bag in bags for row in _rows(bag)], schema)
+    parquet.write_table(table, buffer, compression='zstd')
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         write_whole(out, buffer.getvalue())
@@ -45,17 +40,14 @@ def write_fleet_table(bags: Sequence[FleetBag], out: Path) -> None:
         raise ValueError(f'{out}: cannot write the table: {error.strerror}') from None
 
 
-def _level_names() -> tuple[str, ...]:
-    return tuple(f'level_{name}' for name in LEVEL_COLUMNS)
-
-
-def _levels(summary: BagSummary | None) -> list[Any]:
-    found = summary.levels.tolist() if summary is not None else []
-    return found or [[None] * len(LEVEL_COLUMNS)]
-
-
-def _type_of(arrow: Any, name: str) -> Any:
-    return arrow.float64() if name in _level_names() else arrow.string()
+def _rows(bag: FleetBag) -> Iterator[dict[str, Any]]:
+    """A row for each pressure level of a bag."""
+    of_bag: dict[str, Any] = {'bag': str(bag.path), 'level': bag.level, 'why': bag.why}
+    of_bag |= {name: getattr(bag.summary, name, None) for name in _OF_BAG}
+    levels = bag.summary.levels.tolist() if bag.summary is not None else []
+    for level in levels or [()]:
+        row = of_bag | dict(zip(_OF_LEVEL, level, strict=False))
+        yield {name: _storable(value) for name, value in row.items()}
 
 
 def _storable(value: Any) -> Any:

@@ -92,28 +92,20 @@ def _parameter_rows(case: LubricationCase) -> list[tuple[Any, ...]]:
     return acting + [row for name in drawn for row in parameter_rows(getattr(case.oring, name), f'oring.{name}.')]
 
 
-def shades(values: list[float], unit: str, lightest: float) -> list[dict[str, Any]]:
-    """Opacity of the curve of each value, darker for later ones, and a label for the first and the last."""
-    count = len(values)
-    alphas = [lightest + (1.0 - lightest) * i / max(1, count - 1) for i in range(count)]
-    labels = [f'{value:g} {unit}' if i in (0, count - 1) else None for i, value in enumerate(values)]
-    return [{'alpha': alpha, 'label': label} for alpha, label in zip(alphas, labels, strict=True)]
-
-
 def map_figure(computed: MapRuns) -> Plot:
     """Steady friction over speed, for each pressure."""
     figure, (left, right) = style.new_figure('Steady friction falls as the film lifts the seal', 4.4, ncols=2)
     speeds = np.array(computed.law.speeds) / MM
-    looks = shades([row.pressure / BAR for row in computed.rows], 'bar', 0.25)
+    looks = style.shades([f'{row.pressure / BAR:g} bar' for row in computed.rows])
     for row, look in zip(computed.rows, looks, strict=True):
-        left.semilogx(speeds, row.friction, color=style.BLUE, **look)
-        right.semilogx(speeds, row.solid / row.friction, color=style.ORANGE, **look)
+        left.semilogx(speeds, row.friction, **look)
+        right.semilogx(speeds, row.solid / row.friction, **look)
     left.set(ylabel='friction of the seal [N]', ylim=(0.0, None))
     right.set_ylabel('solid share [-]')
     for ax in (left, right):
         ax.set_xlabel('speed [mm/s]')
         ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f'{value:g}'))
-        style.legend_above(ax)
+    style.legend_below(figure, left, len(computed.rows))
     return Plot('friction_map', figure)
 
 

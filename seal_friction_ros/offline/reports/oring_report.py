@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.collections import PolyCollection
 from matplotlib.patches import Rectangle
 
@@ -296,12 +295,12 @@ def walls_figure(computed: Computed) -> Plot:
     """Contact stress along rod, gland and downstream wall."""
     results = computed.results
     figure, axes = style.new_figure('Contact stress on all three walls', 3.2, ncols=3, sharey=True)
-    for result, colour in zip(results, colormaps['viridis'](np.linspace(0.0, 0.85, len(results))), strict=True):
+    looks = style.shades([f'{result.pressure / BAR:.3g} bar' for result in results])
+    for result, look in zip(results, looks, strict=True):
         for ax, contact in zip(axes, (result.rod, result.gland, result.wall), strict=True):
             if len(contact.position):
                 position, stress = _closed_profile(contact)
-                label = f'{result.pressure / BAR:.3g} bar'
-                ax.plot((contact.edges[0] + position) / MM, stress / MPA, color=colour, label=label)
+                ax.plot((contact.edges[0] + position) / MM, stress / MPA, **look)
     inner, outer = (
         ('rod', 'gland')
         if computed.file.case.geometry.sliding_wall == 'rod'

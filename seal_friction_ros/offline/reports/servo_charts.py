@@ -22,11 +22,13 @@ from seal_friction_ros.offline.reports.figure_style import Plot, finished, house
 from seal_friction_ros.offline.reports.formatting import force_unit, length_text, length_unit, number
 from seal_friction_ros.offline.reports.page import (
     PARAMETER_HEADS,
+    Columns,
     ReportSummary,
     Table,
     head_of,
     parameter_rows,
     seals_text,
+    table_of,
     write_page,
 )
 
@@ -125,14 +127,15 @@ def _verdict(rubbing: ServoTracking, free: ServoTracking) -> Verdict:
 
 
 def _tracking_table(rubbing: ServoTracking, free: ServoTracking) -> Table:
-    heads = (
-        '', 'RMS error [µm]', 'peak error [µm]', 'amplitude reached [µm]', 'rest per reversal [ms]', '[% of a period]',
-    )  # fmt: skip
-    rows = []
-    for name, t in (('with friction', rubbing), ('without friction', free)):
-        values = (t.rms / UM, t.peak / UM, t.reached / UM, t.dwell / MS, 100.0 * t.dwell_share)
-        rows.append((name, *(number(value, 1) for value in values)))
-    return Table(heads, rows, (0,))
+    columns: Columns = (
+        ('', lambda t: 'with friction' if t is rubbing else 'without friction'),
+        ('RMS error [µm]', lambda t: number(t.rms, 1, unit=UM)),
+        ('peak error [µm]', lambda t: number(t.peak, 1, unit=UM)),
+        ('amplitude reached [µm]', lambda t: number(t.reached, 1, unit=UM)),
+        ('rest per reversal [ms]', lambda t: number(t.dwell, 1, unit=MS)),
+        ('[% of a period]', lambda t: number(t.dwell_share, 1, unit=0.01)),
+    )
+    return table_of((rubbing, free), columns, (0,))
 
 
 def _parameter_table(parameters: ServoParameters, wave: Sine) -> Table:

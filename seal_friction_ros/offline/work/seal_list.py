@@ -11,7 +11,7 @@ from seal_friction_ros.core.friction.identified_motion import ANY_MOTION
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.files import config_names, config_path, read_yaml
 
-_WIDTH = 100  # characters of a line
+_WIDTH = 80  # characters of a line
 
 
 class ListedSeal(NamedTuple):

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from harness.closed_loop_bags import START, write_closed_loop
 from harness.machines import EXCAVATOR, installed, made
 
 from seal_friction_ros.core.estimation.configuration import first_snapshot, snapshot_text
@@ -15,7 +16,9 @@ from seal_friction_ros.core.messages.coder import encode, encode_text
 from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, FEEDFORWARD_TYPE, PRESSURE_TYPE
 from seal_friction_ros.core.messages.records import FeedForward, Pressure
 from seal_friction_ros.core.messages.together import TopicMessage, encode_newest
+from seal_friction_ros.core.servo.motions import Sine
 from seal_friction_ros.files import default_configuration
+from seal_friction_ros.offline.bags.bag import read_messages
 from seal_friction_ros.offline.monitor.live_view import LiveView
 from seal_friction_ros.offline.monitor.node_view import NodeView
 
@@ -101,3 +104,16 @@ def test_what_cannot_be_read_is_counted_and_the_rest_is_held():
     shown.take_newest(encode_newest([TopicMessage(*NEWEST[0][:2], b'\0'), NEWEST[1]]), 12)
     assert shown.malformed == 2
     assert set(shown.held[''].records) == {FeedForward}
+
+
+def test_a_feed_forward_that_raises_the_error_is_told_while_it_acts(tmp_path):
+    """Two seconds each without, with twice the friction, and without again; what is told a tenth before each end."""
+    bag = write_closed_loop(tmp_path / 'loop', (0.0, 2.0, 0.0), waves=(Sine(amplitude=0.0005),))
+    shown, told = followed(), []
+    ends = [1.9, 3.9, 5.9]  # [s]
+    for message in read_messages(bag):
+        while ends and message.log_time > START + ends[0] * 1e9:
+            told.append([one.what for one in shown.findings('') if 'raises the tracking error' in one.what])
+            ends.pop(0)
+        shown.take(message.topic, message.type_name, message.data, message.log_time)
+    assert [len(whats) for whats in told] == [0, 1, 0]

@@ -1,18 +1,25 @@
 """The view of a bag shows at each moment what had come until then."""
 
 import shutil
+import threading
+from collections.abc import Iterator
 from pathlib import Path
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
 
 import numpy as np
 import pytest
 from harness.browser import chromium
-from harness.closed_loop_bags import write_closed_loop
+from harness.closed_loop_bags import START, write_closed_loop
 from harness.example_bags import rewrite, write_inputs, write_recorded
 from harness.monitor_process import shown
+from harness.page_in_browser import violations
 from paths import ROOT
 
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.messages.coder import decode, encode
 from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE, PRESSURE_TYPE
+from seal_friction_ros.core.messages.records import Status
 from seal_friction_ros.offline.bags.bag import BagError, BagMessage, BagWriter, read_messages
 from seal_friction_ros.offline.bags.recorded_run import read_run
 from seal_friction_ros.offline.monitor.actuator_view import COLUMNS, serious_words
@@ -131,6 +138,24 @@ def test_a_long_bag_has_no_more_rows_than_fit(loop: Path, monkeypatch):
     assert column(view, 'time')[-1] == pytest.approx(view.describe()['duration'], abs=0.05)
 
 
+def test_a_fault_of_one_estimate_is_marked_however_far_the_rows_are_apart(tmp_path: Path, monkeypatch):
+    """Of 3000 estimates one has a fault; a row holds 60 of them."""
+    bag = write_closed_loop(tmp_path / 'loop', (0.0,), seconds=3.0)
+    place = next(number for number, message in enumerate(read_messages(bag)) if message.log_time > START + 2 * 10**9)
+
+    def once(number: int, message: BagMessage) -> BagMessage:
+        if message.type_name != ESTIMATE_TYPE or not place <= number < place + 7:
+            return message
+        estimate = decode(ESTIMATE_TYPE, message.data)
+        return message._replace(data=encode(estimate._replace(status=int(Status.FORCE_NOT_FINITE))))
+
+    monkeypatch.setattr('seal_friction_ros.offline.monitor.recorded_view.MOST_ROWS', 50)
+    (faults,) = RecordedView(rewrite(bag, tmp_path / 'fault', once)).load().describe()['faults'].values()
+    ((begin, end, words),) = faults
+    assert begin - 0.06 <= 2.0 <= end
+    assert words == 'the force sum is not a finite number'
+
+
 def test_a_bag_is_shown_from_its_first_estimate_on_while_the_rest_is_read(loop: Path):
     view, whole = RecordedView(loop), RecordedView(loop).load().view('', -1.0, 1.0)
     about = view.describe()
@@ -145,17 +170,52 @@ def test_a_bag_is_shown_from_its_first_estimate_on_while_the_rest_is_read(loop: 
 
 @pytest.mark.skipif(not chromium(), reason='no Chromium: apt-get install chromium')
 def test_the_page_shows_how_far_a_bag_has_been_read_and_follows(loop: Path):
-    view, drawn = RecordedView(loop), 'byId("friction-curve").getBBox().width'
-    server = MonitorServer(view)
+    view, drawn, may_read = RecordedView(loop), 'byId("friction-curve").getBBox().width', threading.Event()
+    server = MonitorServer(view, work=slices_after(may_read, view))
     server.start()
     try:
         with shown(server.url, 1400) as page:
             page.wait_for('byId("clock").textContent.includes("read to") && columns.time.length')
             assert page.value('columns.time.at(-1)') <= view.describe()['loaded']
             early = page.value(drawn)
-            view.load()
+            may_read.set()
             page.wait_for('!byId("clock").textContent.includes("read to")')
             assert page.value(drawn) > 900.0 > early
+    finally:
+        server.stop()
+
+
+@pytest.mark.skipif(not chromium(), reason='no Chromium: apt-get install chromium')
+def test_the_view_of_a_bag_is_for_people_without_a_mouse_too():
+    view = RecordedView(ROOT / 'bags' / 'faults').load()
+    server = MonitorServer(view)
+    server.start()
+    try:
+        with shown(server.url, 1400) as page:
+            page.wait_for('byId("marks").children.length && columns.time.length')
+            assert violations(page) == []
+    finally:
+        server.stop()
+
+
+def slices_after(event: threading.Event, view: RecordedView) -> Iterator[None]:
+    """The rest of a bag, once an event is set."""
+    while not event.wait(0.001):
+        yield
+    yield from view.read()
+
+
+@pytest.mark.skipif(not chromium(), reason='no Chromium: apt-get install chromium')
+def test_a_page_that_asks_on_is_told_why_it_is_refused(loop: Path):
+    view = RecordedView(loop)
+    server = MonitorServer(view, work=slices_after(threading.Event(), view))
+    server.start()
+    try:
+        with shown(server.url, 1400) as page:
+            page.wait_for('byId("clock").textContent.includes("read to")')
+            server.token = server.token[::-1]
+            page.wait_for('byId("reason").textContent.includes("of an earlier monitor")')
+            assert page.value('byId("verdict-word").textContent') == 'refused'
     finally:
         server.stop()
 
@@ -170,7 +230,17 @@ def test_damage_ends_what_is_shown_and_the_verdict_says_so(tmp_path: Path):
     now = view.view('', -1.0)['now']
     assert now['verdict'] == 'bad'
     assert now['reason'].startswith('not read to its end')
-    assert now['next'] == 'use seal_friction recover'
+    assert now['next'] == f'save the rest: seal_friction recover {damaged}'
+
+
+def test_a_file_that_is_gone_is_not_to_be_recovered(tmp_path: Path):
+    with BagWriter(tmp_path / 'split', split_duration=1.0) as writer:
+        for message in read_messages(ROOT / 'bags' / 'pull_test'):
+            writer.write(*message)
+    view = RecordedView(tmp_path / 'split')
+    max(tmp_path.glob('split/*.mcap')).unlink()
+    now = view.load().view('', -1.0)['now']
+    assert (now['verdict'], now['next']) == ('bad', 'mend what it names: what comes after it is not shown')
 
 
 def test_the_overview_has_the_friction_and_the_reversals_of_the_whole_bag(loop: Path):
@@ -191,9 +261,15 @@ def test_a_bag_without_estimates_is_refused_with_what_to_do(tmp_path: Path):
         RecordedView(write_inputs(tmp_path / 'inputs', 20))
 
 
-def test_a_bag_cannot_be_changed(tmp_path: Path):
-    view = RecordedView(write_recorded(tmp_path)).load()
-    assert not view.off()[0].confirmed
-    assert not view.change('', 'scale', 0.0)[0].confirmed
-    with pytest.raises(ValueError, match='parameter'):
-        view.change('', 'seals', 0.0)
+@pytest.mark.parametrize('path', ['change', 'off', 'lift'])
+def test_a_bag_cannot_be_changed(tmp_path: Path, path: str):
+    server = MonitorServer(RecordedView(write_recorded(tmp_path)))
+    server.start()
+    try:
+        head = {'Content-Type': 'application/json'}
+        request = Request(server.url.replace('/?', f'/{path}?'), data=b'{}', headers=head)  # noqa: S310  our own server
+        with pytest.raises(HTTPError) as refused:
+            urlopen(request)  # noqa: S310
+        assert (refused.value.code, refused.value.read()) == (400, b'this is a recording: nothing is changed')
+    finally:
+        server.stop()

@@ -17,6 +17,7 @@ from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, FEEDFORW
 from seal_friction_ros.core.servo.motions import Chirp, Sine
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun, read_run
 from seal_friction_ros.offline.replay.replay import replay
+from seal_friction_ros.offline.replay.run_findings import raised
 from seal_friction_ros.offline.replay.tracking_evaluation import (
     MIN_SAMPLES,
     SETTLING_TIME,
@@ -132,6 +133,17 @@ def test_stretches_are_compared_with_the_first_one_without_feedforward():
     assert [s.feedforward_peak for s in found.stretches] == [0.0, 30.0, 60.0]
     assert [s.start for s in found.stretches] == pytest.approx([SETTLED, 2.0 + SETTLED, 4.0 + SETTLED])
     assert found.notes == ()
+
+
+@pytest.mark.parametrize(('change', 'scatter', 'is_told'), [(5.0, 0.0, 0), (20.0, 0.0, 1), (20.0, 0.6, 0)])
+def test_a_rise_of_the_error_is_told_above_10_percent_and_its_noise(change: float, scatter: float, is_told: int):
+    """Of a feed-forward with errors of known mean, which scatter from period to period; with other settings never."""
+    periods = np.repeat(1.0 + scatter * np.random.default_rng(1).uniform(-1.0, 1.0, 20), round(PERIOD * RATE))
+    error = 1e-4 * periods * np.repeat([1.0, 1.0 + 0.01 * change], 2000)
+    run = recorded_run(4.0, (0.0, 0.9), feedforward_force=np.repeat([0.0, 30.0], 2000))
+    found = evaluate_tracking(dataclasses.replace(run, position=run.reference - error))
+    assert len(list(raised(found))) == len(list(raised(found, found.compensated.settings))) == is_told
+    assert not list(raised(found, found.without.settings))
 
 
 def test_another_reference_is_not_compared_and_said():

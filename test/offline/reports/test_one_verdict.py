@@ -17,6 +17,7 @@ from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.friction.actuator import actuator_friction
 from seal_friction_ros.core.messages.coder import decode, encode
 from seal_friction_ros.core.messages.layouts import FORCE_TYPE, PRESSURE_TYPE
+from seal_friction_ros.core.servo.motions import Sine
 from seal_friction_ros.files import load_configuration
 from seal_friction_ros.offline.bags.bag import BagError, BagWriter
 from seal_friction_ros.offline.commands.main import main
@@ -29,6 +30,7 @@ FRICTION = actuator_friction(OWN.parameters().estimator.seals, 3e6, 3e6).coulomb
 SECONDS = 60.0
 HOUR = 3600.0
 TOO_MUCH = 2.0  # [-] scale of a feed-forward
+SMALL = Sine(amplitude=0.0005)  # that a rod without feed-forward does not follow: with twice the friction it overshoots
 DAY = replace(Day(FRICTION), dip=0.0, presliding=1e-6)
 
 
@@ -70,7 +72,8 @@ def bags(tmp_path_factory) -> Path:
     record(folder, 'short', seconds=2.5)
     with BagWriter(folder / 'empty'):
         pass
-    write_closed_loop(folder / 'raised', (0.0, TOO_MUCH))
+    write_closed_loop(folder / 'raised', (0.0, TOO_MUCH), waves=(SMALL,))
+    replay(folder / 'raised', None, folder / 'replayed_raised')
     return folder
 
 
@@ -84,6 +87,7 @@ RUNS = {
     'short': ('look', 'a verdict takes 4'),
     'empty': ('bad', 'nothing to estimate from'),
     'raised': ('bad', 'the feed-forward raises the tracking error by'),
+    'replayed_raised': ('bad', 'the feed-forward raises the tracking error by'),
 }
 """Name of a run -> its verdict, and words of the reason that decides."""
 CHANGES = {'good': 'no change beyond the noise', 'weaker': 'sliding friction -17.0 %'}

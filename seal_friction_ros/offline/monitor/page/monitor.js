@@ -673,7 +673,12 @@ function writeMarks() {
 // What has been read meanwhile.
 async function readOn() {
   try {
-    about = await (await fetch(address('/describe'))).json();
+    const response = await fetch(address('/describe'));
+    if (!response.ok) {
+      refused(await refusal(response));
+      return;
+    }
+    about = await response.json();
     showBag();
   } catch (error) {
     lost();
