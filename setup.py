@@ -1,4 +1,8 @@
-"""Build of the ament_python package: `colcon build --base-paths . msg_defs`, or `make setup` without ROS."""
+"""Build of the package: `pip install .` without ROS, `colcon build --base-paths . msg_defs` or `make setup` with it.
+
+With ROS the requirements come by package.xml or requirements/run.txt; the packages of ROS are not on PyPI. The lowest
+versions are those of requirements/lowest.txt.
+"""
 
 from pathlib import Path
 
@@ -15,7 +19,7 @@ def shared(folder: str, pattern: str) -> tuple[str, list[str]]:
 
 setup(
     name=NAME,
-    version='0.1.0',
+    version='0.2.0',
     packages=find_packages(include=[NAME, NAME + '.*', STUDIES, STUDIES + '.*']),
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
@@ -33,6 +37,7 @@ setup(
         shared('config/ehl', '*.yaml'),
         shared('config/simulated_machines', '*.yaml'),
         shared('data/thesis', '*.csv'),
+        shared('msg_defs/msg', '*.msg'),  # to write bags without ROS
         shared('launch', '*.launch.py'),
     ],
     package_data={
@@ -43,8 +48,19 @@ setup(
         f'{STUDIES}.offline': ['templates/*.html'],
     },
     python_requires='>=3.11',
-    # What no distribution packages; the rest comes by package.xml, or by requirements/run.txt.
-    install_requires=['mcap>=1.5.0', 'rosbags>=0.11.9'],
+    install_requires=[
+        'numpy>=1.26.4',
+        'PyYAML>=6.0.1',  # seal, rig and parameter files
+        'mcap>=1.5.0',  # bags; brings lz4 and zstandard
+        'rosbags>=0.11.9',  # message types, for bags without definitions
+        'scipy>=1.11.4',  # identify, O-rings, seals with a table
+        'numba>=0.58.1',  # tune, servo, ehl; long replays
+        'matplotlib>=3.6.3',  # pages
+        'Jinja2>=3.1.2',  # pages
+        'tornado>=6.4',  # monitor BAG
+        'rich>=13.7.1',  # progress
+        'argcomplete>=3.1.4',  # completion in a shell
+    ],
     zip_safe=False,
     # Commands on a Dask cluster, and tables for it; the versions of requirements/dev.txt.
     extras_require={

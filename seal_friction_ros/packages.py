@@ -21,6 +21,8 @@ OPTIONAL = {
     'distributed': '',
     'fsspec': '',
     'pyarrow': '',
+    'pandas': 'python3-pandas',
+    'xarray': 'python3-xarray',
 }
 """Module, which is also its name on PyPI -> package of Debian and Ubuntu; empty: there is none that we tested."""
 

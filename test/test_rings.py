@@ -240,6 +240,13 @@ def test_the_yaml_door_knows_only_core():
     assert all(is_below(name, f'{PACKAGE}.core') for name in own)
 
 
+def test_the_python_interface_stands_on_core_and_offline_and_nothing_on_it():
+    face = f'{PACKAGE}.api'
+    assert not [name for name in imported((SOURCES / 'api.py').read_text()) if is_below(name, f'{PACKAGE}.nodes')]
+    everything = [(file, name) for file in SOURCES.rglob('*.py') for name in imported(file.read_text())]
+    assert [file.name for file, name in everything if is_below(name, face)] == ['__init__.py']
+
+
 @pytest.mark.parametrize('ring', ['core', 'offline', 'nodes', 'files'])
 def test_imports_are_written_in_full(ring):
     assert not offenders(ring, lambda name: name.startswith('.'))

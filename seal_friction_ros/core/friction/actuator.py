@@ -1,9 +1,14 @@
 """One seal, the seals of an actuator, and their friction together."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.compiled import Bound, compilable, evaluate, unrolled
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
@@ -90,6 +95,38 @@ class Seal(CheckedParameters):
         """Whether its sliding friction differs from its Coulomb friction."""
         terms = self.velocity_terms is not None or self.pressure_asymmetry is not None
         return self.coulomb_law.depends_on_speed or terms
+
+    def friction(self, pressure: ArrayLike, velocity: ArrayLike) -> float | FloatArray:
+        """Friction force of the sliding seal [N], with the sign of the velocity; at rest 0: see `breakaway`.
+
+        Args:
+            pressure: [Pa, gauge] at the seal, one number or an array; both broadcast. NaN gives NaN.
+            velocity: [m/s] positive on extension, for a seal of chamber a.
+        """
+        return self._over(lambda f, v: math.copysign(f.coulomb_friction + f.velocity_friction, v) if v else 0.0,
+                          pressure, velocity)  # fmt: skip
+
+    def friction_std(self, pressure: ArrayLike, velocity: ArrayLike = 0.0) -> float | FloatArray:
+        """Standard deviation of `friction` [N], for a new reading; at rest of the Coulomb friction."""
+        return self._over(lambda friction, _: friction.coulomb_friction_std, pressure, velocity)
+
+    def breakaway(self, pressure: ArrayLike) -> float | FloatArray:
+        """Largest friction at rest [N], a magnitude; arguments as of `friction`."""
+        return self._over(lambda friction, _: friction.coulomb_friction + friction.stiction, pressure, 0.0)
+
+    def _over(
+        self, number: Callable[['ActuatorFriction', float], float], pressure: ArrayLike, velocity: ArrayLike
+    ) -> float | FloatArray:
+        """A number of the friction at each pressure and velocity."""
+        mounted = (MountedSeal(self, 'a'),)
+
+        def at(one: float, speed: float) -> float:
+            """At one of them."""
+            known = math.isfinite(one) and math.isfinite(speed)
+            return number(actuator_friction(mounted, one, 0.0, speed), speed) if known else math.nan
+
+        each = np.frompyfunc(at, 2, 1)(np.asarray(pressure, float), np.asarray(velocity, float))
+        return np.asarray(each, float) if np.ndim(each) else float(each)
 
     def _check_monotone(self) -> None:
         # 200 intervals over twice the identified range: a table of points can hide a fall between two of them.

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -10,15 +11,21 @@ from typing import Any
 from seal_friction_ros.core.messages.definitions import Definition, full_name, parse_definition
 from seal_friction_ros.core.messages.layouts import PACKAGE
 from seal_friction_ros.files import share_directory
-from seal_friction_ros.packages import needed
+from seal_friction_ros.packages import MissingPackageError, needed
+
+_LINE = '=' * 80 + '\n'
+_HINT = 'run make setup, or source the colcon workspace'
 
 
 @cache
 def message_definition(type_name: str) -> tuple[str, str]:
     """Full text of the definition of an installed message type, and its RIHS01 hash; ValueError if it is not installed.
 
-    The text of a message of this project has its comments, with the units.
+    The text of a message of this project has its comments, with the units. Without the package of the type, ``rosbags``
+    knows the types of ROS 2, and this project its own, to the same bytes.
     """
+    if find_spec(type_name.partition('/')[0]) is None:
+        return _without_ros(type_name)
     try:
         description = json.loads(_definition_file(type_name, '.json').read_text())
         hashes = {entry['type_name']: entry['hash_string'] for entry in description['type_hashes']}
@@ -31,9 +38,41 @@ def message_definition(type_name: str) -> tuple[str, str]:
             package, _, stem = name.split('/')
             parts.append(f'MSG: {package}/{stem}\n{_definition_text(name)}')
     except (OSError, ValueError, LookupError) as error:
-        hint = 'run make setup, or source the colcon workspace'
-        raise ValueError(f'{type_name} is not installed: {hint}: {error}') from None
-    return ('=' * 80 + '\n').join(parts), hashes[type_name]
+        raise ValueError(f'{type_name} is not installed: {_HINT}: {error}') from None
+    return _LINE.join(parts), hashes[type_name]
+
+
+def _without_ros(type_name: str) -> tuple[str, str]:
+    """As `message_definition`, without the package of the type."""
+    try:
+        generated, _ = _typestore().generate_msgdef(type_name, ros_version=2)
+    except needed('rosbags.typesys').TypesysError:
+        raise ValueError(f'{type_name} is not installed, nor a type of ROS 2: {_HINT}') from None
+    main, *used = generated.split(_LINE)
+    parts = [_commented(type_name, main)]
+    for head, _, text in (part.partition('\n') for part in used):
+        parts.append(f'{head}\n{_commented(head.removeprefix("MSG: "), text)}')
+    return _LINE.join(parts), str(_typestore().hash_rihs01(type_name))
+
+
+def _own_folder() -> Path:
+    return share_directory('seal_friction_ros', __file__) / 'msg_defs' / 'msg'
+
+
+def _commented(type_name: str, text: str) -> str:
+    """Text of a type, of this project as in its file."""
+    own = _own_folder() / f'{type_name.rpartition("/")[2]}.msg'
+    return own.read_text() if type_name.startswith(PACKAGE) else text
+
+
+@cache
+def _typestore() -> Any:
+    """Types of ROS 2 in ``rosbags``, and those of this project."""
+    typesys = needed('rosbags.typesys')
+    store = typesys.get_typestore(typesys.Stores.LATEST)
+    for path in _own_folder().glob('*.msg'):
+        store.register(typesys.get_types_from_msg(path.read_text(), f'{PACKAGE}/msg/{path.stem}'))
+    return store
 
 
 def _collect(fields: Any, known: Mapping[str, Any], used: list[str]) -> None:
@@ -67,11 +106,11 @@ def installed_definitions(types: Iterable[str]) -> dict[str, Definition]:
 
 def known_definition(type_name: str) -> str:
     """Definition of an installed type, or of one of ROS 2, which old SQLite bags lack; ValueError if it is neither."""
-    try:
+    with suppress(ValueError):
         return message_definition(type_name)[0]
+    try:
+        return _without_ros(type_name)[0]
+    except MissingPackageError:
+        raise
     except ValueError:
-        typesys = needed('rosbags.typesys')
-        try:
-            return str(typesys.get_typestore(typesys.Stores.LATEST).generate_msgdef(type_name, ros_version=2)[0])
-        except typesys.TypesysError:
-            raise ValueError('neither in the bag, nor installed, nor a type of ROS 2') from None
+        raise ValueError('neither in the bag, nor installed, nor a type of ROS 2') from None

@@ -10,7 +10,6 @@ from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.actuator import MountedSeal, Seal, actuator_friction
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.files import read_yaml
-from seal_friction_ros.offline.contact.oring_runs import compute_case, seal_document
 
 
 @dataclass(frozen=True)
@@ -52,6 +51,11 @@ def seal_of(path: Path) -> Seal:
     """
     document = read_yaml(path)
     if isinstance(document, dict) and 'groove' in document:
+        from seal_friction_ros.offline.contact.oring_runs import (  # noqa: PLC0415  loads scipy
+            compute_case,
+            seal_document,
+        )
+
         document = seal_document(compute_case(path, for_seal_file=True))
     with named_errors(path):
         return parse_seal(document)

@@ -254,6 +254,20 @@ def replay(
             return _compare(_written(steps, replayed, writer), replayed)
 
 
+def answered_anew(
+    actuator: ActuatorBag, override: Configuration | None = None
+) -> tuple[ActuatorBag, Iterator[rosbag.BagMessage]]:
+    """An actuator with the topics of new answers, and its messages with these answers; arguments as of `Replay`."""
+    replayed = Replay(actuator, override)
+    answers = {_FIELDS[kind]: topic for topic, kind in replayed.answers.items()}
+    topics = actuator.topics._replace(configuration=replayed.configuration, **answers)
+    kept = (message for step in replayed.steps() for message in replayed.kept_of(step))
+    return actuator._replace(topics=topics), kept
+
+
+_FIELDS = {layouts.ESTIMATE_TYPE: 'estimate', layouts.FEEDFORWARD_TYPE: 'feedforward'}
+
+
 def count_messages(topics: Mapping[str, rosbag.TopicInfo]) -> int:
     """Number of messages on all topics."""
     return sum(info.message_count for info in topics.values())

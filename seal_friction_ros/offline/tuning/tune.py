@@ -39,7 +39,7 @@ from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag
 from seal_friction_ros.offline.bags.bag import BagError
 from seal_friction_ros.offline.bags.columns import Block, collected
 from seal_friction_ros.offline.bags.recorded_run import RunCollector, wanted_of_run
-from seal_friction_ros.offline.replay.replay import Replay
+from seal_friction_ros.offline.replay.replay import answered_anew
 from seal_friction_ros.offline.work.atomic_file import write_whole
 from seal_friction_ros.offline.work.progress import progress
 from seal_friction_ros.offline.work.targets import mark
@@ -314,12 +314,8 @@ def read_recording(
     for type_name, (topic, reason) in needed.items():
         if not topic:
             raise BagError(f'{bag}: no message of {type_name} in it, but {reason}: record this topic too')
-    replayed = Replay(actuator, override)
-    answers = {_FIELDS[kind]: topic for topic, kind in replayed.answers.items()}
-    source = actuator._replace(topics=topics._replace(configuration=replayed.configuration, **answers))
-    kept = (message for step in replayed.steps() for message in replayed.kept_of(step))
-    axis = collected(source, wanted_of_run(source), _AxisCollector, messages=kept)
-    return axis.recording(source)
+    source, messages = answered_anew(actuator, override)
+    return collected(source, wanted_of_run(source), _AxisCollector, messages=messages).recording(source)
 
 
 class _AxisCollector(RunCollector):
@@ -359,7 +355,6 @@ class _AxisCollector(RunCollector):
         return recording, RecordedTrack(run.reference[chosen], run.position[chosen]), configuration
 
 
-_FIELDS = {layouts.ESTIMATE_TYPE: 'estimate', layouts.FEEDFORWARD_TYPE: 'feedforward'}
 _OF_RUN = ('state', 'status', 'coulomb_friction', 'velocity', 'force_sum')
 
 

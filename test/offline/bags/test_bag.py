@@ -21,6 +21,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from seal_friction_ros.core.messages.coder import DECODERS, decode_text, encode_text
 from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE
+from seal_friction_ros.offline.bags import definitions
 from seal_friction_ros.offline.bags.bag import (
     BagError,
     BagWriter,
@@ -106,6 +107,17 @@ def test_message_definitions_keep_the_comments_with_the_units(path: Path):
     assert ours.keys() == others.keys()
     foreign = [name for name in ours if 'seal_friction_msgs' not in name]  # those of this project have comments
     assert [ours[name] for name in foreign] == [others[name] for name in foreign]
+
+
+def test_without_ros_the_definitions_of_our_messages_are_the_same_to_the_byte(monkeypatch):
+    kinds = [*DECODERS, *(f'seal_friction_msgs/msg/{path.stem}' for path in MESSAGES.glob('*.msg'))]
+    installed = {kind: message_definition(kind) for kind in kinds}
+    monkeypatch.setattr(definitions, 'find_spec', lambda _: None)
+    message_definition.cache_clear()
+    assert {kind: message_definition(kind) for kind in kinds} == installed
+    with pytest.raises(ValueError, match='a_msgs/msg/B is not installed, nor a type of ROS 2'):
+        message_definition('a_msgs/msg/B')
+    message_definition.cache_clear()
 
 
 def test_a_file_is_byte_for_byte_that_of_the_writer_of_mcap(tmp_path: Path):
