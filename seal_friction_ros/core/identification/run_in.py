@@ -19,7 +19,6 @@ from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.validation import CrossValidation
 
 FEWEST_STROKES = 6  # for a drift term (our choice)
-LARGEST_ERROR = 0.03  # relative standard error below which an asymptote is determined (our choice)
 EVIDENT = 4.0  # standard errors of the approach from which it is evident (our choice)
 WORTHWHILE = 0.02  # [-] smallest difference of the settled seal from the run that is corrected (our choice)
 LENGTHS = 15  # lengths of travel that are tried, of `SHORTEST` to all of the travel (our choice)
@@ -36,8 +35,6 @@ class Drift(NamedTuple):
     level: int
     change: float  # [-] from the first stroke to the last, relative to the mean
     is_evident: bool  # beyond the scatter of the strokes, with an end that can be told
-    asymptote: float  # [N] friction of the settled seal; NaN if the strokes alone do not determine it
-    length: float  # [m] travel over which the difference falls to 37 %; likewise
     settled_share: float  # [-] friction of the settled seal over the mean of the run; 1 if no drift is evident
     settled_std: float  # [-] standard deviation of it
 
@@ -67,25 +64,22 @@ def _drift(travel: FloatArray, friction: FloatArray, direction: FloatArray) -> D
     sides = [friction[direction == side] for side in (-1.0, 1.0)]
     slopes = [np.polyfit(np.arange(len(side)), side, 1)[0] * (len(side) - 1) for side in sides if len(side) >= 2]
     change = float(np.mean(slopes)) / mean if slopes else math.nan
-    nothing = Drift(0, 0, change, False, math.nan, math.nan, 1.0, 0.0)
+    nothing = Drift(0, 0, change, False, 1.0, 0.0)
     if not len(travel) or float(np.ptp(travel)) <= 0.0 or not mean > 0.0:
         return nothing
-    asymptote, length = _determined(travel, friction, direction)
-    found = nothing._replace(asymptote=asymptote, length=length)
-    approaches = _approaches(travel, friction, direction, SHORTEST, 1.0)
+    approaches = _approaches(travel, friction, direction)
     best = min(approaches, key=lambda one: one.square)
     settled, std = _settled(approaches, len(friction))
     if abs(best.height) < EVIDENT * best.height_error or abs(settled / mean - 1.0) < WORTHWHILE:
-        return found
+        return nothing
     if not std <= UNSURE * settled:  # also a friction below 0
-        return found
-    return found._replace(is_evident=True, settled_share=settled / mean, settled_std=std / mean)
+        return nothing
+    return nothing._replace(is_evident=True, settled_share=settled / mean, settled_std=std / mean)
 
 
 class _Approach(NamedTuple):
     """Exponential approach with one length, fitted by least squares."""
 
-    length: float  # [m]
     asymptote: float  # [N]
     error: float  # [N] standard error of it
     last: float  # [N] at the end of the run
@@ -94,13 +88,11 @@ class _Approach(NamedTuple):
     square: float  # [N^2] sum of the squared residuals
 
 
-def _approaches(
-    travel: FloatArray, friction: FloatArray, direction: FloatArray, shortest: float, longest: float
-) -> list[_Approach]:
-    """Approaches of lengths between shares of the travel; an offset that is left is fitted with each."""
+def _approaches(travel: FloatArray, friction: FloatArray, direction: FloatArray) -> list[_Approach]:
+    """Approaches of lengths up to the whole travel; an offset that is left is fitted with each."""
     spanned, found = float(np.ptp(travel)), []
     side = direction - direction.mean()
-    for length in spanned * np.geomspace(shortest, longest, LENGTHS):
+    for length in spanned * np.geomspace(SHORTEST, 1.0, LENGTHS):
         left = np.exp(-(travel - travel.min()) / length)
         design = np.column_stack((np.ones_like(travel), left, side))
         values, *_ = np.linalg.lstsq(design, friction, rcond=None)
@@ -111,22 +103,8 @@ def _approaches(
         correlation = min(max(float(residual[1:] @ residual[:-1]) / max(square, 1e-300), 0.0), 0.9)
         height_error *= math.sqrt((1.0 + correlation) / (1.0 - correlation))
         last = float(values[0] + values[1] * math.exp(-spanned / length))
-        found.append(_Approach(float(length), float(values[0]), error, last, float(values[1]), height_error, square))
+        found.append(_Approach(float(values[0]), error, last, float(values[1]), height_error, square))
     return found
-
-
-def _determined(travel: FloatArray, friction: FloatArray, direction: FloatArray) -> tuple[float, float]:
-    """Asymptote [N] and length [m] that the strokes alone determine; NaN if they do not.
-
-    They do if the standard error is below `LARGEST_ERROR`, the rod travelled twice the length, and the approach fits
-    clearly better than a line.
-    """
-    best = min(_approaches(travel, friction, direction, SHORTEST, 0.5), key=lambda found: found.square)
-    straight = np.column_stack((np.ones_like(travel), travel, direction - direction.mean()))
-    line, *_ = np.linalg.lstsq(straight, friction, rcond=None)
-    bends = best.square < 0.7 * float(np.sum((friction - straight @ line) ** 2))
-    certain = best.error < LARGEST_ERROR * abs(best.asymptote)
-    return (best.asymptote, best.length) if bends and certain else (math.nan, math.nan)
 
 
 def _settled(found: Sequence[_Approach], strokes: int) -> tuple[float, float]:

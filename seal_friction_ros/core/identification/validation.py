@@ -5,7 +5,7 @@ readings give the same result.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple, cast
 
@@ -30,7 +30,7 @@ class CrossValidation:
     predicted: FloatArray  # [N] shape (n,)
     deviation: FloatArray  # [N] measured - predicted, shape (n,)
     losses: FloatArray  # root mean square of the weighted deviation in each group [-], shape (groups,)
-    parameters: FloatArray  # fitted without each group, shape (groups, parameters)
+    values: tuple[ParameterValues, ...]  # parameters that were fitted without each group
 
     @property
     def rms(self) -> float:
@@ -58,12 +58,12 @@ def cross_validate(
     if law.has_prior:
         return _left_out_of_model(law, readings)
     predicted, deviation = np.empty(readings.count), np.empty(readings.count)
-    parameters = []
+    each = []
     for out, (others, left_out) in zip(readings.groups, readings.splits, strict=True):
         values, predicted[out], deviation[out] = predict(law, others, left_out, near)
-        parameters.append([values[p.name] for p in law.parameters])
+        each.append(values)
         tick(1)
-    return CrossValidation(predicted, deviation, group_losses(readings, deviation), np.array(parameters))
+    return CrossValidation(predicted, deviation, group_losses(readings, deviation), tuple(each))
 
 
 def _left_out_of_model(law: CandidateLaw, readings: FrictionReadings) -> CrossValidation:
@@ -71,9 +71,8 @@ def _left_out_of_model(law: CandidateLaw, readings: FrictionReadings) -> CrossVa
     model = cast(ModelFit, fit(law, readings).model)  # a law with a prior has one
     predicted, deviation, vectors = friction_model.left_out(model, readings)
     seals = readings.at.pressure.shape[1]
-    values = [values_of_model(law, replace(model, vector=vector), seals) for vector in vectors]
-    parameters = np.array([[each[p.name] for p in law.parameters] for each in values])
-    return CrossValidation(predicted, deviation, group_losses(readings, deviation), parameters)
+    values = tuple(values_of_model(law, replace(model, vector=vector), seals) for vector in vectors)
+    return CrossValidation(predicted, deviation, group_losses(readings, deviation), values)
 
 
 def predict(
@@ -106,7 +105,7 @@ def plain_mean(readings: FrictionReadings) -> CrossValidation | None:
             return None
         predicted[i] = measured[others].mean()
     losses = group_losses(readings, measured - predicted)
-    return CrossValidation(predicted, measured - predicted, losses, np.empty((len(losses), 0)))
+    return CrossValidation(predicted, measured - predicted, losses, ())
 
 
 def group_losses(readings: FrictionReadings, deviation: FloatArray) -> FloatArray:
@@ -115,20 +114,24 @@ def group_losses(readings: FrictionReadings, deviation: FloatArray) -> FloatArra
 
 
 def jackknife_errors(estimates: FloatArray) -> FloatArray:
-    """Standard error by the jackknife, from ``estimates`` without each group, shape (groups, parameters).
+    """Standard error by the jackknife; argument and source as of `jackknife_covariance`."""
+    return np.asarray(np.sqrt(np.diag(jackknife_covariance(estimates))))
+
+
+def jackknife_covariance(estimates: FloatArray) -> FloatArray:
+    """Covariance by the jackknife, shape (parameters, parameters), from ``estimates``, shape (groups, parameters).
 
     An error that all readings of a group share (a test, a pressure, a minute) counts once, not once for each reading.
 
     Source: [Efron1982]_.
     """
-    groups = len(estimates)
-    return np.asarray(np.sqrt((groups - 1) / groups * np.sum((estimates - estimates.mean(axis=0)) ** 2, axis=0)))
-
-
-def jackknife_covariance(estimates: FloatArray) -> FloatArray:
-    """Covariance by the jackknife, shape (parameters, parameters); arguments and source as of `jackknife_errors`."""
     groups, off = len(estimates), estimates - estimates.mean(axis=0)
     return np.asarray((groups - 1) / groups * off.T @ off)
+
+
+def table_of(values: Sequence[ParameterValues], names: Sequence[str]) -> FloatArray:
+    """Parameters of several fits as a table, shape (fits, names)."""
+    return np.array([[each[name] for name in names] for each in values])
 
 
 class PredictionUncertainty(NamedTuple):

@@ -381,6 +381,7 @@ def assess(
     with progress('test the band', groups * (groups - 1)) as advance:
         coverage = validation.band_coverage(selection.law, selection.readings, found.values, advance)
     names = [parameter.name for parameter in selection.law.parameters]
+    errors = validation.jackknife_errors(validation.table_of(left_out.values, names))
     return LawQuality(
         uncertainty=validation.prediction_uncertainty(left_out.predicted, left_out.deviation, groups, in_addition),
         between_runs=between,
@@ -393,7 +394,7 @@ def assess(
         repeatability=diagnostics.repeatability(used, found.offsets),
         drifts=[] if used.are_samples else run_in.drifts(everything, offsets),
         breakaway=_breakaway(data, found),
-        standard_errors=dict(zip(names, validation.jackknife_errors(left_out.parameters).tolist(), strict=True)),
+        standard_errors=dict(zip(names, errors.tolist(), strict=True)),
     )
 
 

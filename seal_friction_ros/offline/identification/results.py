@@ -29,6 +29,7 @@ from seal_friction_ros.core.identification.validation import (
     CrossValidation,
     PredictionUncertainty,
     jackknife_covariance,
+    table_of,
 )
 from seal_friction_ros.offline.identification.load_numbers import load_numbers
 from seal_friction_ros.offline.identification.presliding import (
@@ -220,11 +221,10 @@ def seal_document(
 
 def _covariance(selection: LawSelection, number: int) -> dict[str, Any]:
     """Covariance of the parameters of one seal of a kind, by fits without each group."""
-    law, values, names = selection.law, selection.fit.values, [p.name for p in selection.law.parameters]
-    terms = list(dict.fromkeys(name.rpartition('.')[2] for name in names))  # without the name of a kind
-    fits = [dict(zip(names, row, strict=True)) for row in selection.validation.parameters.tolist()]
-    of_one = [law.of_one_seal({**values, **fit})[number] for fit in fits]
-    covariance = jackknife_covariance(np.array([[each[term] for term in terms] for each in of_one]))
+    law = selection.law
+    terms = list(dict.fromkeys(p.name.rpartition('.')[2] for p in law.parameters))  # without the name of a kind
+    of_one = [law.of_one_seal(each)[number] for each in selection.validation.values]
+    covariance = jackknife_covariance(table_of(of_one, terms))
     std = np.sqrt(np.diag(covariance))
     correlation = np.clip(covariance / np.maximum(np.outer(std, std), 1e-300), -1.0, 1.0)
     return {'terms': terms, 'std': std, 'correlation': correlation[np.triu_indices(len(terms), 1)]}
@@ -442,8 +442,6 @@ def _run_in_numbers(data: IdentificationData, drifts: Sequence[Drift]) -> list[d
             'source': data.sources.files[drift.source].name,
             'pressure_Pa': data.prepared.readings.level_pressures[drift.level],
             'change': drift.change,
-            'asymptote_N': drift.asymptote,
-            'length_m': drift.length,
             'is_evident': drift.is_evident,
             'settled_share': drift.settled_share,
             'settled_std': drift.settled_std,

@@ -38,6 +38,7 @@ from seal_friction_ros.core.identification.validation import (
     jackknife_errors,
     plain_mean,
     prediction_uncertainty,
+    table_of,
 )
 
 POWER = {'friction_at_no_pressure': 5.0, 'friction_at_one_bar': 0.9, 'pressure_exponent': 0.65}
@@ -137,7 +138,8 @@ def test_standard_errors_are_those_of_repeating_it_all():
         readings = noted(scatter=0.08, seed=seed, count=6)
         found = fit(LAW, readings)
         estimates.append(found.values['friction_at_no_pressure'])
-        errors.append(jackknife_errors(cross_validate(LAW, readings, found.values).parameters)[0])
+        each = cross_validate(LAW, readings, found.values).values
+        errors.append(jackknife_errors(table_of(each, ['friction_at_no_pressure']))[0])
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.std(estimates), rel=0.35)
 
 
@@ -148,7 +150,8 @@ def test_standard_errors_know_that_the_readings_of_a_test_are_off_together():
     for seed in range(40):
         readings = noted(scatter=0.01, test_scatter=0.1, seed=seed, law=constant, values={CONSTANT: 20.0})
         found = fit(constant, readings)
-        errors.append(jackknife_errors(cross_validate(constant, readings, found.values).parameters)[0] / 20.0)
+        each = cross_validate(constant, readings, found.values).values
+        errors.append(jackknife_errors(table_of(each, [CONSTANT]))[0] / 20.0)
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(0.1 / np.sqrt(3.0), rel=0.25)
 
 

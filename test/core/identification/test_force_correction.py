@@ -23,7 +23,7 @@ def prepared(area, noise=(0.0,) * 5, pressures=LEVELS, other=0.0, chamber='a', s
     parts = tuple(np.full(11, one) for one in force) if samples else ()
     zeros = np.zeros(len(level), dtype=int)
     readings = FrictionReadings(at, force, zeros, level, level, ('log',), 'pressure', False, parts)
-    return PreparedReadings(readings, both if chamber == 'a' else both[:, ::-1], None, {}, {}, {})
+    return PreparedReadings(readings, both if chamber == 'a' else both[:, ::-1], None, ())
 
 
 @pytest.mark.parametrize('chamber', ['a', 'b'])

@@ -26,7 +26,6 @@ from seal_friction_ros.core.identification.load_over_position import (
     _normal,
     _pressure_terms,
     _shared_positions,
-    _speed_terms,
     _spline_knots,
     _strokes,
     averaging_window,
@@ -481,15 +480,6 @@ def test_friction_follows_the_pressure_of_the_seals_or_of_one_chamber_with_each_
     assert any(name.startswith('P_seals') for name, _ in _pressure_terms(held, ('a',))[0])
     assert not any(name.startswith('P_b') for name, _ in _pressure_terms(held, ('a',))[0])
     assert _pressure_terms(rows(n=2), ('a', 'b')) == ([], [()])
-
-
-def test_friction_over_speed_is_viscous_with_one_of_three_stribeck_speeds():
-    speed = np.linspace(0.0, 0.1, 101)  # of which 95 % are below 0.095 m/s
-    terms, choices = _speed_terms(rows(n=101, speed=speed))
-    assert [name for name, _ in terms] == ['viscous', *(f'Stribeck {v} m/s' for v in ('0.00475', '0.0142', '0.038'))]
-    assert terms[0][1].tolist() == speed.tolist()
-    assert [column[38] for _, column in terms[1:]] == pytest.approx(np.exp([-8.0, -8.0 / 3.0, -1.0]))
-    assert choices == [(), (0,), (0, 1), (0, 2), (0, 3)]
 
 
 # --- the fit of one model ---

@@ -30,7 +30,7 @@ from seal_friction_ros.core.identification.seal_kinds import (
     told_apart,
 )
 from seal_friction_ros.core.identification.selection import variation_of
-from seal_friction_ros.core.identification.validation import cross_validate
+from seal_friction_ros.core.identification.validation import cross_validate, jackknife_errors, table_of
 
 BAR = 1e5  # [Pa]
 ROD, PISTON = SealKind('rod seals', ('a', 'a')), SealKind('piston seal', ('difference',))
@@ -160,6 +160,21 @@ def test_standard_errors_hold_what_the_parts_are_off_by():
         model = checked(cylinder(noise=0.03, count=3, seed=seed, areas=(0.0, 0.0)), 9.0)[0].model
         off.append((model.parts - truth) / model.errors)
     assert 0.5 < np.sqrt(np.mean(np.square(off))) < 1.5
+
+
+def test_the_terms_of_one_seal_scatter_by_their_standard_errors():
+    """Also the friction that no pressure divides, since its division follows from the rises; the jackknife is wide."""
+    names = ('friction_at_no_pressure', 'friction_at_one_bar', 'pressure_exponent', 'viscous_friction')
+    found, errors = [], []
+    for seed in range(20):
+        data = cylinder(noise=0.03, count=3, seed=seed, areas=(0.0, 0.0))
+        law = law_of(data)
+        found.append(table_of(law.of_one_seal(fit(law, data).values), names))
+        left_out = zip(*(law.of_one_seal(each) for each in cross_validate(law, data, {}).values), strict=True)
+        errors.append([jackknife_errors(table_of(of_kind, names)) for of_kind in left_out])
+    ratio = np.sqrt(np.mean(np.square(errors), axis=0)) / np.std(found, axis=0, ddof=1)
+    assert ratio.min() > 0.7
+    assert ratio.max() < 3.0
 
 
 def test_the_left_out_condition_is_predicted_by_the_others():
