@@ -23,7 +23,7 @@ BLUE, SKY, ORANGE, VERMILLION, GREEN, PURPLE = '#0072b2', '#56b4e9', '#e69f00', 
 WIDTH = 8.6  # [inch]
 _LEGEND_HEIGHT = 0.3  # [inch]
 COLUMNS = 1200  # of pixels across a figure
-DETAIL = 6000  # the same for the figure of a page, which is zoomed
+DETAIL = 4000  # the same for the figure of a page, which is zoomed
 _LONGEST_STEP = 10.0  # usual steps between two values that a line joins (our choice)
 _STYLE = {
     'axes.axisbelow': True,
