@@ -123,13 +123,13 @@ def shades(labels: Sequence[str]) -> list[dict[str, Any]]:
     return [{'color': colour, 'label': label} for colour, label in zip(colours, labels, strict=True)]
 
 
-def legend_below(figure: Figure, ax: Axes, columns: int) -> None:
+def legend_below(figure: Figure, ax: Axes, columns: int, **look: Any) -> None:
     """Legend of the artists of ``ax`` in one row below all axes of a figure of `new_figure`."""
     share = _LEGEND_HEIGHT / figure.get_figheight()
     engine: Any = figure.get_layout_engine()
     if engine is not None:
         engine.set(rect=(0.0, share, 1.0, 1.0 - share))
-    figure.legend(*ax.get_legend_handles_labels(), loc='lower right', ncols=columns)
+    figure.legend(*ax.get_legend_handles_labels(), loc='lower right', ncols=columns, **look)
 
 
 def legend_above(ax: Axes, chosen: slice = slice(None)) -> None:
