@@ -248,7 +248,7 @@ def study_figure(study: StudyRuns) -> Plot:
         right.plot(x, friction / stress, lw=1.2, **look)
     left.set(xlabel=POSITION_LABEL, ylabel=FRICTION_LABEL)
     right.set(xlabel=POSITION_LABEL, ylabel='friction over solid shear stress [N/MPa]')
-    style.legend_below(figure, left, len(study.runs))
+    style.legend_below(figure, left, len(study.runs), columnspacing=1.0, handlelength=1.2)
     return Plot('solid_shear_stress', figure)
 
 

@@ -20,8 +20,8 @@ from seal_friction_ros.offline.monitor.off_latch import Answer, OffLatch, Scale
 
 RATE = 100.0  # [Hz] of the rows: 20 points of a motion at 5 Hz, 5 new ones a frame (our choice)
 KEPT = 30.0  # [s] of rows that are kept
-CHANGEABLE = {'scale': '1', 'lead_time': 's', 'force_limit': 'N'}
-"""Parameter of the feed-forward that the page may change -> its unit."""
+CHANGEABLE = ('scale', 'lead_time', 'force_limit')
+"""parameters of the feed-forward that the page may change"""
 
 Wanted = dict[str, dict[str, float]]
 """Name of a node -> values by ROS name of the parameter."""

@@ -23,7 +23,7 @@ BLUE, SKY, ORANGE, VERMILLION, GREEN, PURPLE = '#0072b2', '#56b4e9', '#e69f00', 
 WIDTH = 8.6  # [inch]
 _LEGEND_HEIGHT = 0.3  # [inch]
 COLUMNS = 1200  # of pixels across a figure
-DETAIL = 6000  # the same for the figure of a page, which is zoomed
+DETAIL = 4000  # the same for the figure of a page, which is zoomed
 _LONGEST_STEP = 10.0  # usual steps between two values that a line joins (our choice)
 _STYLE = {
     'axes.axisbelow': True,
@@ -123,13 +123,13 @@ def shades(labels: Sequence[str]) -> list[dict[str, Any]]:
     return [{'color': colour, 'label': label} for colour, label in zip(colours, labels, strict=True)]
 
 
-def legend_below(figure: Figure, ax: Axes, columns: int) -> None:
+def legend_below(figure: Figure, ax: Axes, columns: int, **look: Any) -> None:
     """Legend of the artists of ``ax`` in one row below all axes of a figure of `new_figure`."""
     share = _LEGEND_HEIGHT / figure.get_figheight()
     engine: Any = figure.get_layout_engine()
     if engine is not None:
         engine.set(rect=(0.0, share, 1.0, 1.0 - share))
-    figure.legend(*ax.get_legend_handles_labels(), loc='lower right', ncols=columns)
+    figure.legend(*ax.get_legend_handles_labels(), loc='lower right', ncols=columns, **look)
 
 
 def legend_above(ax: Axes, chosen: slice = slice(None)) -> None:

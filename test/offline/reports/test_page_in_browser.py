@@ -37,8 +37,9 @@ def drag(tab, selector: str, left: float, right: float) -> None:
 
 
 def ticks(tab, figure: str) -> list[list[float]]:
-    """Range of the x axis and of the y axis of each panel of a figure."""
-    return tab.value(f'figures.{figure}.map(({{scales}}) => [scales.x.min, scales.x.max, scales.y.min, scales.y.max])')
+    """Range of the x axis and of the y axis of each panel of a figure, after panels out of sight have followed."""
+    shown = f'figures.{figure}.map(({{scales}}) => [scales.x.min, scales.x.max, scales.y.min, scales.y.max])'
+    return tab.value(f'new Promise((done) => setTimeout(() => done({shown})))')
 
 
 def test_a_drag_zooms_time_alone_of_all_panels_over_the_same_time_and_a_double_click_shows_everything(path: Path):

@@ -563,16 +563,19 @@ function connect(wanted = '', since = -1) {
   };
 }
 
-// Go on where the stream broke off; with another monitor from the beginning. A refusal has a reason: no stream tells it.
+// Ask what the server shows; whether it answers. A refusal has a reason, which the page then says.
+async function describe() {
+  const response = await fetch(address('/describe'));
+  if (response.ok) about = await response.json();
+  else refused(await refusal(response));
+  return response.ok;
+}
+
+// Go on where the stream broke off; with another monitor from the beginning.
 async function reconnect(wanted) {
+  const before = about.start;
   try {
-    const response = await fetch(address('/describe'));
-    if (!response.ok) {
-      refused(await refusal(response));
-      return;
-    }
-    const before = about.start;
-    about = await response.json();
+    if (!await describe()) return;
     if (about.start !== before) clearRows();
   } catch (error) {  // not there yet
   }
@@ -673,12 +676,7 @@ function writeMarks() {
 // What has been read meanwhile.
 async function readOn() {
   try {
-    const response = await fetch(address('/describe'));
-    if (!response.ok) {
-      refused(await refusal(response));
-      return;
-    }
-    about = await response.json();
+    if (!await describe()) return;
     showBag();
   } catch (error) {
     lost();
@@ -724,18 +722,12 @@ function makeSpans(choices) {
 }
 
 async function begin() {
-  let response;
   try {
-    response = await fetch(address('/describe'));
+    if (!await describe()) return;
   } catch (error) {
     lost();
     return;
   }
-  if (!response.ok) {
-    refused(await refusal(response));
-    return;
-  }
-  about = await response.json();
   clearRows();
   const isLive = about.mode === 'live';
   makeSpans(isLive ? [2, 5, 10, 30] : [2, 5, 10, 60]);

@@ -54,8 +54,8 @@ const figures = {}; // id -> the charts of its panels
     for (const panel of panels) {
       if (panel.key !== chosen.key) continue;
       panel.range = [min, min + span];
-      panel.chart.setScale('x', { min, max: min + span });
-      panel.say();
+      if (panel.isSeen) panel.follow();
+      else setTimeout(() => panel.follow()); // what is seen answers first
     }
   };
   const scale = (panel, factor, middle = 0.5) => {
@@ -80,6 +80,17 @@ const figures = {}; // id -> the charts of its panels
       html('small', '', head, ` ${data.y.label.replace(/\s+/g, ' ')}`);
       this.note = html('small', 'resolution', head);
       panels.push(this);
+    }
+
+    get isSeen() {
+      const { top, bottom } = this.box.getBoundingClientRect();
+      return bottom > 0 && top < innerHeight;
+    }
+
+    follow() {
+      const [min, max] = this.range, shown = this.chart.scales.x;
+      if (shown.min !== min || shown.max !== max) this.chart.setScale('x', { min, max });
+      this.say();
     }
 
     // Where a curve of lowest and highest values has no more to show.
