@@ -9,7 +9,7 @@ installed (`MissingPackageError`). What has to be compiled is kept on disk, as b
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
@@ -18,9 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seal_friction_ros.compiled_code import keep_compiled_code
-from seal_friction_ros.core.estimation.configuration import Configuration, SealSelection, parse_snapshot
+from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
 from seal_friction_ros.core.estimation.pipeline import init, receive
-from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.friction.actuator import Seal
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.messages.records import (
@@ -36,7 +35,7 @@ from seal_friction_ros.core.messages.records import (
     Velocity,
 )
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, TuningSettings
-from seal_friction_ros.files import config_path, default_configuration, load_configuration
+from seal_friction_ros.files import config_path
 from seal_friction_ros.offline.work.outcome import error_text
 from seal_friction_ros.packages import MissingPackageError, as_missing, needed
 
@@ -56,15 +55,6 @@ Name = str | Path
 """Path of a file or bag, or the name of a file in ``config``."""
 _P = ParamSpec('_P')
 _R = TypeVar('_R')
-UNITS = {
-    'time': 's', 'velocity': 'm/s', 'pressure_a': 'Pa', 'pressure_b': 'Pa', 'force_sum': 'N', 'position': 'm',
-    'reference': 'm', 'coulomb_friction': 'N', 'coulomb_friction_std': 'N', 'breakaway_force': 'N',
-    'friction_force': 'N', 'input_age': 's', 'adaptation_offset': 'N', 'residual': 'N', 'feedforward_force': 'N',
-    'replayed_force': 'N',
-}  # fmt: skip
-"""Column -> its unit; the others are numbers without unit."""
-
-
 SAMPLES = (
     'time', 'velocity', 'pressure_a', 'pressure_b', 'force_sum', 'reference_velocity', 'reference_acceleration',
     'temperature',
@@ -108,38 +98,24 @@ def load_seal(name: Name) -> Seal:
 # -- columns ----------------------------------------------------------------------------------------------------------
 
 
-class Columns(Mapping[str, NDArray[Any]]):
+class Columns(dict[str, NDArray[Any]]):
     """Samples as columns of equal length, each an array of numpy by its name: ``columns['friction_force']``."""
 
-    def __init__(
-        self, columns: Mapping[str, NDArray[Any]], start: int = 0, configuration: Configuration | None = None
-    ) -> None:
-        self._columns = dict(columns)
-        self.start = start
-        """[ns] stamp at which ``time`` is 0"""
-        self.configuration = configuration
-        """seals and settings of the estimates, the last ones of a bag; None: not known"""
-
-    def __getitem__(self, name: str) -> NDArray[Any]:
-        return self._columns[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._columns)
-
-    def __len__(self) -> int:
-        return len(self._columns)
+    start: int = 0
+    """[ns] stamp at which ``time`` is 0"""
+    configuration: Configuration | None = None
+    """seals and settings of the estimates, the last ones of a bag; None: not known"""
 
     def __repr__(self) -> str:
         return f'Columns of {len(self["time"])} samples: {", ".join(self)}'
 
     def to_pandas(self) -> Any:
         """``pandas.DataFrame`` with ``time`` [s] as index; MissingPackageError without pandas."""
-        return needed('pandas').DataFrame(self._columns).set_index('time')
+        return needed('pandas').DataFrame(dict(self)).set_index('time')
 
     def to_xarray(self) -> Any:
-        """``xarray.Dataset`` over ``time``, units in the attributes; MissingPackageError without xarray."""
-        variables = {name: ('time', values, {'units': UNITS.get(name, '1')}) for name, values in self.items()}
-        return needed('xarray').Dataset(variables, attrs={'start_ns': self.start})
+        """``xarray.Dataset`` over ``time`` [s]; MissingPackageError without xarray."""
+        return needed('xarray').Dataset({name: ('time', values) for name, values in self.items()})
 
 
 @_one_line
@@ -165,18 +141,19 @@ def read_bag(
     """
     from seal_friction_ros.offline.bags.columns import collected
     from seal_friction_ros.offline.bags.recorded_run import RunCollector, read_run, wanted_of_run
-    from seal_friction_ros.offline.replay.replay import answered_anew
+    from seal_friction_ros.offline.replay.replay import answered_anew, chosen_configuration
 
-    actuator, override = _actuator(bag, namespace, mapping), _configuration(seals, params)
+    actuator, override = _actuator(bag, namespace, mapping), chosen_configuration(params, seals)
     if override is None and actuator.topics.estimate:
         run = read_run(actuator.path, namespace, actuator.mapping)
     else:
         source, messages = answered_anew(actuator, override)
         run = collected(source, wanted_of_run(source), RunCollector, messages=messages).run(source)
-    names = ('time', *(name for name in UNITS if name != 'time'), *FrictionEstimate._fields[1:])
-    columns = {name: values for name in names if (values := getattr(run, name)) is not None}
-    known = [parse_snapshot(text).configuration for _, text in run.configurations[-1:]]
-    return Columns(columns, run.start, *known)
+    columns = Columns({name: values for name, values in vars(run).items() if isinstance(values, np.ndarray)})
+    columns.start = run.start
+    if run.configurations:
+        columns.configuration = parse_snapshot(run.configurations[-1][1]).configuration
+    return columns
 
 
 def _actuator(bag: Name, namespace: str, mapping: Name | None) -> 'ActuatorBag':
@@ -184,19 +161,6 @@ def _actuator(bag: Name, namespace: str, mapping: Name | None) -> 'ActuatorBag':
     from seal_friction_ros.offline.bags.mapped_bag import read_mapping
 
     return open_actuator(Path(bag), namespace, None if mapping is None else read_mapping(str(mapping)))
-
-
-def _configuration(seals: Name | Sequence[Name], params: Name | None) -> Configuration | None:
-    """Configuration from seal files and a parameter file; None without both."""
-    from seal_friction_ros.offline.replay.replay import chosen_configuration
-
-    several = () if isinstance(seals, str | Path) else tuple(map(str, seals))
-    one = str(seals) if isinstance(seals, str | Path) else None
-    found = chosen_configuration(None if params is None else Path(params), one)
-    if not several:
-        return found
-    known = found or default_configuration()
-    return load_configuration(SealSelection(several), known.settings, known.feedforward, known.adaptation)
 
 
 # -- the estimator ----------------------------------------------------------------------------------------------------
@@ -219,7 +183,9 @@ class Estimator:
         *,
         configuration: Configuration | None = None,
     ) -> None:
-        chosen = configuration or _configuration(seals, params)
+        from seal_friction_ros.offline.replay.replay import chosen_configuration
+
+        chosen = configuration or chosen_configuration(params, seals)
         if chosen is None:
             raise ValueError('Estimator: no seals: name a seal file, or a parameter file with the parameter seals')
         self.configuration = chosen
@@ -237,10 +203,8 @@ class Estimator:
             sent: When it was sent, on the same clock [ns]; None: when it was received.
         """
         answers: list[Output] = []
-        receive(
-            self._parameters, self._state, message, message.stamp if received is None else received,
-            lambda answer, _: answers.append(answer), sent,
-        )  # fmt: skip
+        arrived = message.stamp if received is None else received
+        receive(self._parameters, self._state, message, arrived, lambda answer, _: answers.append(answer), sent)
         forces = [answer for answer in answers if isinstance(answer, FeedForward)]
         self.feedforward = forces[-1] if forces else self.feedforward
         return answers
@@ -259,7 +223,7 @@ class Estimator:
     ) -> FrictionEstimate:
         """Estimate at one sample; `feedforward` is then the newest one.
 
-        NaN, and a pressure of chamber a of NaN: there is no new sample of this input, and the last one holds until it
+        NaN: there is no new sample of this input (of both pressures, for ``pressure_a``); the last one holds until it
         is too old.
 
         Args:
@@ -300,10 +264,10 @@ class Estimator:
         for row in zip(*(column.tolist() for column in columns.values()), strict=True):
             estimates.append(self.step(**dict(zip(columns, row, strict=True))))
             forces.append(self.feedforward.force if self.feedforward else math.nan)
-        fields = FrictionEstimate._fields[1:]
-        found = {name: np.array([getattr(one, name) for one in estimates]) for name in fields}
-        time: FloatArray = columns['time']
-        return Columns({'time': time, **found, 'feedforward_force': np.array(forces)}, 0, self.configuration)
+        made = {name: np.array([getattr(one, name) for one in estimates]) for name in FrictionEstimate._fields[1:]}
+        found = Columns({'time': columns['time'], **made, 'feedforward_force': np.array(forces)})
+        found.configuration = self.configuration
+        return found
 
 
 # -- what the commands do ---------------------------------------------------------------------------------------------
@@ -328,9 +292,10 @@ def replay(
         namespace: As of `read_bag`.
     """
     from seal_friction_ros.offline.replay.parallel_replay import verify
+    from seal_friction_ros.offline.replay.replay import chosen_configuration
     from seal_friction_ros.offline.replay.replay import replay as replay_and_write
 
-    override = _configuration(seals, params)
+    override = chosen_configuration(params, seals)
     if out is None:
         return verify(Path(bag), override, namespace)
     return replay_and_write(Path(bag), override, Path(out), namespace)
@@ -432,12 +397,13 @@ def tune(
         namespace: As of `read_bag`.
         mapping: As of `read_bag`.
     """
+    from seal_friction_ros.offline.replay.replay import chosen_configuration
     from seal_friction_ros.offline.tuning import tune as tuning
     from seal_friction_ros.offline.work.targets import PARAMETER_FILE, checked_targets
 
     targets = [] if out is None else [(Path(out), PARAMETER_FILE)]
     kind = TuningSettings if bag is None else RecordedAxisSettings
-    given, chosen = kind() if settings is None else settings, _configuration(seals, params)
+    given, chosen = kind() if settings is None else settings, chosen_configuration(params, seals)
     found: BagTuning | SimulatorTuning
     with checked_targets('tune', targets, [] if bag is None else [Path(bag)], force=False):
         if isinstance(given, TuningSettings) and bag is None:
