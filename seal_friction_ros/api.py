@@ -40,11 +40,12 @@ from seal_friction_ros.offline.work.outcome import error_text
 from seal_friction_ros.packages import MissingPackageError, as_missing, needed
 
 if TYPE_CHECKING:
-    from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag
+    from seal_friction_ros.offline.bags.mapped_bag import MappingFile
     from seal_friction_ros.offline.identification.results import Identification
     from seal_friction_ros.offline.replay.answer_comparison import ReplayResult
     from seal_friction_ros.offline.replay.compare import BagComparison
     from seal_friction_ros.offline.tuning.tune import BagTuning, SimulatorTuning
+    from seal_friction_ros.offline.work.executor import Workers
 
 __all__ = [
     'Columns', 'Estimator', 'FrictionState', 'MissingPackageError', 'RecordedAxisSettings', 'Seal', 'Status',
@@ -78,9 +79,6 @@ def _one_line(function: Callable[_P, _R]) -> Callable[_P, _R]:
     return called
 
 
-# -- a seal -----------------------------------------------------------------------------------------------------------
-
-
 @_one_line
 def load_seal(name: Name) -> Seal:
     """Seal of a seal file, or of an O-ring case (``config/oring``), which is computed in seconds.
@@ -93,9 +91,6 @@ def load_seal(name: Name) -> Seal:
     from seal_friction_ros.offline.contact.seal_force import seal_of
 
     return seal_of(config_path('seals', str(name)))
-
-
-# -- columns ----------------------------------------------------------------------------------------------------------
 
 
 class Columns(dict[str, NDArray[Any]]):
@@ -139,13 +134,15 @@ def read_bag(
         seals: As of `Estimator`. With ``seals`` or ``params``, and of a bag without estimates, they are made anew.
         params: ROS parameter file of the estimator.
     """
+    from seal_friction_ros.offline.bags.actuator_bag import open_actuator
     from seal_friction_ros.offline.bags.columns import collected
     from seal_friction_ros.offline.bags.recorded_run import RunCollector, read_run, wanted_of_run
     from seal_friction_ros.offline.replay.replay import answered_anew, chosen_configuration
 
-    actuator, override = _actuator(bag, namespace, mapping), chosen_configuration(params, seals)
+    given, override = _mapping(mapping), chosen_configuration(params, seals)
+    actuator = open_actuator(Path(bag), namespace, given)
     if override is None and actuator.topics.estimate:
-        run = read_run(actuator.path, namespace, actuator.mapping)
+        run = read_run(actuator.path, namespace, given)
     else:
         source, messages = answered_anew(actuator, override)
         run = collected(source, wanted_of_run(source), RunCollector, messages=messages).run(source)
@@ -156,14 +153,10 @@ def read_bag(
     return columns
 
 
-def _actuator(bag: Name, namespace: str, mapping: Name | None) -> 'ActuatorBag':
-    from seal_friction_ros.offline.bags.actuator_bag import open_actuator
+def _mapping(name: Name | None) -> 'MappingFile | None':
     from seal_friction_ros.offline.bags.mapped_bag import read_mapping
 
-    return open_actuator(Path(bag), namespace, None if mapping is None else read_mapping(str(mapping)))
-
-
-# -- the estimator ----------------------------------------------------------------------------------------------------
+    return None if name is None else read_mapping(str(name))
 
 
 class Estimator:
@@ -270,9 +263,6 @@ class Estimator:
         return found
 
 
-# -- what the commands do ---------------------------------------------------------------------------------------------
-
-
 @_one_line
 def replay(
     bag: Name,
@@ -281,6 +271,7 @@ def replay(
     params: Name | None = None,
     out: Name | None = None,
     namespace: str = '',
+    workers: 'Workers' = 1,
 ) -> 'ReplayResult':
     """Replay a bag through the estimator: ``result.identical`` tells whether every recorded answer came out again.
 
@@ -290,15 +281,17 @@ def replay(
         params: ROS parameter file, in place of the recorded parameters.
         out: Bag to write with inputs and new answers; must not exist.
         namespace: As of `read_bag`.
+        workers: Processes that share a long bag.
     """
-    from seal_friction_ros.offline.replay.parallel_replay import verify
+    from seal_friction_ros.offline.replay.parallel_replay import verify, verify_shared
     from seal_friction_ros.offline.replay.replay import chosen_configuration
     from seal_friction_ros.offline.replay.replay import replay as replay_and_write
 
     override = chosen_configuration(params, seals)
-    if out is None:
-        return verify(Path(bag), override, namespace)
-    return replay_and_write(Path(bag), override, Path(out), namespace)
+    if out is not None:
+        return replay_and_write(Path(bag), override, Path(out), namespace)
+    shared = verify_shared(Path(bag), namespace, workers) if override is None else None
+    return shared or verify(Path(bag), override, namespace)
 
 
 @_one_line
@@ -311,6 +304,7 @@ def compare(
     tolerances: Mapping[str, float | None] | None = None,
     topic: str = '',
     namespace: str = '',
+    mapping: Name | None = None,
 ) -> 'BagComparison':
     """Compare the messages of equal stamp in two bags: ``result.agree``, ``result.fields['friction_force'].largest``.
 
@@ -322,10 +316,13 @@ def compare(
         tolerances: Field that decides -> its absolute tolerance, None: ``atol``; by default the friction decides.
         topic: By default that of the friction estimates.
         namespace: As of `read_bag`.
+        mapping: As of `read_bag`.
     """
     from seal_friction_ros.offline.replay import compare as bags
 
-    return bags.compare(Path(a), Path(b), topic, atol, rtol, tolerances=tolerances, namespace=namespace)
+    return bags.compare(
+        Path(a), Path(b), topic, atol, rtol, tolerances=tolerances, namespace=namespace, mapping=_mapping(mapping)
+    )
 
 
 @_one_line
@@ -339,7 +336,9 @@ def identify(
     seal: Name | None = None,
     law: str | None = None,
     presliding: bool = False,
-    workers: int = 1,
+    namespace: str = '',
+    mapping: Name | None = None,
+    workers: 'Workers' = 1,
 ) -> 'Identification':
     """Identify a seal from bags, logs, tables or data sheets: ``result.document`` is the seal file, checked.
 
@@ -352,6 +351,8 @@ def identify(
         seal: Seal file with the geometry of the ring.
         law: Law to save instead of the recommended one.
         presliding: Identify the elasticity of the seals, too.
+        namespace: As of `read_bag`.
+        mapping: As of `read_bag`.
         workers: Processes; the result does not depend on their number.
     """
     from seal_friction_ros.offline.identification import pipeline
@@ -361,18 +362,20 @@ def identify(
     from seal_friction_ros.offline.work.targets import SEAL_FILE, checked_targets, mark
 
     places = [place_of(str(path)) for path in ([sources] if isinstance(sources, str | Path) else sources)]
-    of_sources = SourceOptions(rig=_text(rig), chambers=None if chambers is None else tuple(chambers))
-    options = pipeline.IdentifyOptions(sources=of_sources, seal=_text(seal), law=law, presliding=presliding)
+    of_sources = SourceOptions(
+        rig=None if rig is None else str(rig),
+        chambers=None if chambers is None else tuple(chambers),
+        namespace=namespace,
+        mapping=_mapping(mapping),
+    )
+    ring = None if seal is None else str(seal)
+    options = pipeline.IdentifyOptions(sources=of_sources, seal=ring, law=law, presliding=presliding)
     targets = [] if out is None else [(Path(out), SEAL_FILE)]
     with checked_targets('identify', targets, [place for place in places if isinstance(place, Path)], force=False):
         found = pipeline.identify(places, options, name, workers)
         for path, _ in targets:
             write_seal(found.document, path, f'Seal file, {mark("identify")}.')
     return found
-
-
-def _text(name: Name | None) -> str | None:
-    return None if name is None else str(name)
 
 
 @_one_line
@@ -385,6 +388,7 @@ def tune(
     out: Name | None = None,
     namespace: str = '',
     mapping: Name | None = None,
+    machine: Name | None = None,
 ) -> 'BagTuning | SimulatorTuning':
     """Tune the feed-forward: ``result.found.feedforward`` has its parameters, ``result.numbers`` what they are worth.
 
@@ -396,7 +400,9 @@ def tune(
         out: ROS parameter file to write.
         namespace: As of `read_bag`.
         mapping: As of `read_bag`.
+        machine: Parameter file of ``servo_simulator``, the simulated servo.
     """
+    from seal_friction_ros.offline.bags.actuator_bag import open_actuator
     from seal_friction_ros.offline.replay.replay import chosen_configuration
     from seal_friction_ros.offline.tuning import tune as tuning
     from seal_friction_ros.offline.work.targets import PARAMETER_FILE, checked_targets
@@ -407,13 +413,14 @@ def tune(
     found: BagTuning | SimulatorTuning
     with checked_targets('tune', targets, [] if bag is None else [Path(bag)], force=False):
         if isinstance(given, TuningSettings) and bag is None:
-            found = tuning.tune_simulator(given, chosen)
+            servo = tuning.DEFAULT_MACHINE if machine is None else tuning.load_machine(Path(machine))
+            found = tuning.tune_simulator(given, chosen, servo)
         elif isinstance(given, RecordedAxisSettings) and bag is not None:
-            found = tuning.tune_bag(_actuator(bag, namespace, mapping), given, chosen)
+            found = tuning.tune_bag(open_actuator(Path(bag), namespace, _mapping(mapping)), given, chosen)
         else:
             raise ValueError(f'tune: settings are {type(given).__name__}, but {kind.__name__} are needed')
         for path, _ in targets:
-            tuning.write_parameters(path, found)
+            tuning.write_parameters(path, found, found.actuator)
     return found
 
 
@@ -421,5 +428,7 @@ def tune(
 def report(bag: Name, out: Name, *, namespace: str = '', mapping: Name | None = None) -> dict[str, Any]:
     """Write the page of a bag with figures and verdict to ``out`` (HTML); returns its numbers, as ``--json`` does."""
     from seal_friction_ros.offline.reports.bag_report import write_report
+    from seal_friction_ros.offline.work.targets import PAGE, checked_targets
 
-    return write_report(Path(bag), Path(out), namespace, _actuator(bag, namespace, mapping).mapping).numbers
+    with checked_targets('report', [(Path(out), PAGE)], [Path(bag)], force=False):
+        return write_report(Path(bag), Path(out), namespace, _mapping(mapping)).numbers
