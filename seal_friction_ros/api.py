@@ -11,6 +11,7 @@ installed (`MissingPackageError`). What has to be compiled is kept on disk, as b
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
@@ -56,11 +57,6 @@ Name = str | Path
 """Path of a file or bag, or the name of a file in ``config``."""
 _P = ParamSpec('_P')
 _R = TypeVar('_R')
-SAMPLES = (
-    'time', 'velocity', 'pressure_a', 'pressure_b', 'force_sum', 'reference_velocity', 'reference_acceleration',
-    'temperature',
-)  # fmt: skip
-"""Columns that `Estimator.over` takes; the first three are needed."""
 
 
 def _one_line(function: Callable[_P, _R]) -> Callable[_P, _R]:
@@ -248,8 +244,9 @@ class Estimator:
         Returns:
             ``time`` as given, the fields of ``FrictionEstimate.msg``, and ``feedforward_force``, NaN before the first.
         """
-        columns = {name: np.asarray(samples[name], float) for name in SAMPLES if name in samples}
-        if missing := [name for name in SAMPLES[:3] if name not in columns]:
+        known = [*signature(self.step).parameters]
+        columns = {name: np.asarray(samples[name], float) for name in known if name in samples}
+        if missing := [name for name in known[:3] if name not in columns]:
             raise ValueError(f'samples have no column {missing[0]}: there are {", ".join(columns) or "none"}')
         if len({column.shape for column in columns.values()}) > 1 or columns['time'].ndim != 1:
             raise ValueError('samples: the columns are not of one length')
