@@ -23,18 +23,8 @@ from seal_friction_ros.core.estimation.configuration import Configuration, parse
 from seal_friction_ros.core.estimation.pipeline import init, receive
 from seal_friction_ros.core.friction.actuator import Seal
 from seal_friction_ros.core.friction.states import FrictionState
-from seal_friction_ros.core.messages.records import (
-    FeedForward,
-    Force,
-    FrictionEstimate,
-    Input,
-    Output,
-    Pressure,
-    ServoReference,
-    Status,
-    Temperature,
-    Velocity,
-)
+from seal_friction_ros.core.messages import records
+from seal_friction_ros.core.messages.records import FeedForward, FrictionEstimate, Input, Output, ServoReference, Status
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, TuningSettings
 from seal_friction_ros.files import config_path
 from seal_friction_ros.offline.work.outcome import error_text
@@ -227,15 +217,15 @@ class Estimator:
         """
         stamp = round(time * 1e9)
         inputs: tuple[tuple[float, Input], ...] = (
-            (pressure_a, Pressure(stamp, float(pressure_a), float(pressure_b))),
-            (force_sum, Force(stamp, float(force_sum))),
-            (temperature, Temperature(stamp, float(temperature))),
+            (pressure_a, records.Pressure(stamp, float(pressure_a), float(pressure_b))),
+            (force_sum, records.Force(stamp, float(force_sum))),
+            (temperature, records.Temperature(stamp, float(temperature))),
             (reference_velocity, ServoReference(stamp, 0.0, float(reference_velocity), float(reference_acceleration))),
         )
         for value, message in inputs:
             if not math.isnan(value):
                 self.receive(message)
-        answers = self.receive(Velocity(stamp, float(velocity)))
+        answers = self.receive(records.Velocity(stamp, float(velocity)))
         return next(answer for answer in answers if isinstance(answer, FrictionEstimate))
 
     def over(self, samples: Mapping[str, ArrayLike]) -> Columns:
