@@ -17,7 +17,7 @@ for time, velocity, pressure_a, pressure_b, force_sum in zip(*sensors, strict=Tr
     friction.append(estimate.friction_force)
     if estimate.status == 0 and estimate.state == FrictionState.SLIDING:
         good += 1
-    compensation = estimator.feedforward.force  # [N] add it to my command; 0 while an input is missing or late
+    compensation = estimator.feedforward.force  # [N] add it to my command; 0 until feedforward.scale is set
 print(f'{len(friction)} samples, {good} of them sliding with status 0; at last {compensation:.1f} N')
 assert good > 300
 

@@ -15,13 +15,14 @@ __all__ = [
 ]  # fmt: skip
 
 
-def __getattr__(name: str) -> Any:
-    if name not in __all__:
-        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
-    from importlib import import_module  # noqa: PLC0415  the package itself loads nothing
+if not TYPE_CHECKING:  # a type checker knows the names, and that there are no others
 
-    return getattr(import_module('seal_friction_ros.api'), name)
+    def __getattr__(name: str) -> Any:
+        if name not in __all__:
+            raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+        from importlib import import_module  # noqa: PLC0415  the package itself loads nothing
 
+        return getattr(import_module('seal_friction_ros.api'), name)
 
-def __dir__() -> list[str]:
-    return [*globals(), *__all__]
+    def __dir__() -> list[str]:
+        return [*globals(), *__all__]

@@ -9,8 +9,9 @@ installed (`MissingPackageError`). What has to be compiled is kept on disk, as b
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
@@ -18,34 +19,24 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seal_friction_ros.compiled_code import keep_compiled_code
-from seal_friction_ros.core.estimation.configuration import Configuration, SealSelection, parse_snapshot
+from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
 from seal_friction_ros.core.estimation.pipeline import init, receive
-from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.friction.actuator import Seal
 from seal_friction_ros.core.friction.states import FrictionState
-from seal_friction_ros.core.messages.records import (
-    FeedForward,
-    Force,
-    FrictionEstimate,
-    Input,
-    Output,
-    Pressure,
-    ServoReference,
-    Status,
-    Temperature,
-    Velocity,
-)
+from seal_friction_ros.core.messages import records
+from seal_friction_ros.core.messages.records import FeedForward, FrictionEstimate, Input, Output, ServoReference, Status
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, TuningSettings
-from seal_friction_ros.files import config_path, default_configuration, load_configuration
+from seal_friction_ros.files import config_path
 from seal_friction_ros.offline.work.outcome import error_text
 from seal_friction_ros.packages import MissingPackageError, as_missing, needed
 
 if TYPE_CHECKING:
-    from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag
+    from seal_friction_ros.offline.bags.mapped_bag import MappingFile
     from seal_friction_ros.offline.identification.results import Identification
     from seal_friction_ros.offline.replay.answer_comparison import ReplayResult
     from seal_friction_ros.offline.replay.compare import BagComparison
     from seal_friction_ros.offline.tuning.tune import BagTuning, SimulatorTuning
+    from seal_friction_ros.offline.work.executor import Workers
 
 __all__ = [
     'Columns', 'Estimator', 'FrictionState', 'MissingPackageError', 'RecordedAxisSettings', 'Seal', 'Status',
@@ -56,20 +47,6 @@ Name = str | Path
 """Path of a file or bag, or the name of a file in ``config``."""
 _P = ParamSpec('_P')
 _R = TypeVar('_R')
-UNITS = {
-    'time': 's', 'velocity': 'm/s', 'pressure_a': 'Pa', 'pressure_b': 'Pa', 'force_sum': 'N', 'position': 'm',
-    'reference': 'm', 'coulomb_friction': 'N', 'coulomb_friction_std': 'N', 'breakaway_force': 'N',
-    'friction_force': 'N', 'input_age': 's', 'adaptation_offset': 'N', 'residual': 'N', 'feedforward_force': 'N',
-    'replayed_force': 'N',
-}  # fmt: skip
-"""Column -> its unit; the others are numbers without unit."""
-
-
-SAMPLES = (
-    'time', 'velocity', 'pressure_a', 'pressure_b', 'force_sum', 'reference_velocity', 'reference_acceleration',
-    'temperature',
-)  # fmt: skip
-"""Columns that `Estimator.over` takes; the first three are needed."""
 
 
 def _one_line(function: Callable[_P, _R]) -> Callable[_P, _R]:
@@ -88,9 +65,6 @@ def _one_line(function: Callable[_P, _R]) -> Callable[_P, _R]:
     return called
 
 
-# -- a seal -----------------------------------------------------------------------------------------------------------
-
-
 @_one_line
 def load_seal(name: Name) -> Seal:
     """Seal of a seal file, or of an O-ring case (``config/oring``), which is computed in seconds.
@@ -105,41 +79,24 @@ def load_seal(name: Name) -> Seal:
     return seal_of(config_path('seals', str(name)))
 
 
-# -- columns ----------------------------------------------------------------------------------------------------------
-
-
-class Columns(Mapping[str, NDArray[Any]]):
+class Columns(dict[str, NDArray[Any]]):
     """Samples as columns of equal length, each an array of numpy by its name: ``columns['friction_force']``."""
 
-    def __init__(
-        self, columns: Mapping[str, NDArray[Any]], start: int = 0, configuration: Configuration | None = None
-    ) -> None:
-        self._columns = dict(columns)
-        self.start = start
-        """[ns] stamp at which ``time`` is 0"""
-        self.configuration = configuration
-        """seals and settings of the estimates, the last ones of a bag; None: not known"""
-
-    def __getitem__(self, name: str) -> NDArray[Any]:
-        return self._columns[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._columns)
-
-    def __len__(self) -> int:
-        return len(self._columns)
+    start: int = 0
+    """[ns] stamp at which ``time`` is 0"""
+    configuration: Configuration | None = None
+    """seals and settings of the estimates, the last ones of a bag; None: not known"""
 
     def __repr__(self) -> str:
         return f'Columns of {len(self["time"])} samples: {", ".join(self)}'
 
     def to_pandas(self) -> Any:
         """``pandas.DataFrame`` with ``time`` [s] as index; MissingPackageError without pandas."""
-        return needed('pandas').DataFrame(self._columns).set_index('time')
+        return needed('pandas').DataFrame(dict(self)).set_index('time')
 
     def to_xarray(self) -> Any:
-        """``xarray.Dataset`` over ``time``, units in the attributes; MissingPackageError without xarray."""
-        variables = {name: ('time', values, {'units': UNITS.get(name, '1')}) for name, values in self.items()}
-        return needed('xarray').Dataset(variables, attrs={'start_ns': self.start})
+        """``xarray.Dataset`` over ``time`` [s]; MissingPackageError without xarray."""
+        return needed('xarray').Dataset({name: ('time', values) for name, values in self.items()})
 
 
 @_one_line
@@ -163,43 +120,29 @@ def read_bag(
         seals: As of `Estimator`. With ``seals`` or ``params``, and of a bag without estimates, they are made anew.
         params: ROS parameter file of the estimator.
     """
+    from seal_friction_ros.offline.bags.actuator_bag import open_actuator
     from seal_friction_ros.offline.bags.columns import collected
     from seal_friction_ros.offline.bags.recorded_run import RunCollector, read_run, wanted_of_run
-    from seal_friction_ros.offline.replay.replay import answered_anew
+    from seal_friction_ros.offline.replay.replay import answered_anew, chosen_configuration
 
-    actuator, override = _actuator(bag, namespace, mapping), _configuration(seals, params)
+    given, override = _mapping(mapping), chosen_configuration(params, seals)
+    actuator = open_actuator(Path(bag), namespace, given)
     if override is None and actuator.topics.estimate:
-        run = read_run(actuator.path, namespace, actuator.mapping)
+        run = read_run(actuator.path, namespace, given)
     else:
         source, messages = answered_anew(actuator, override)
         run = collected(source, wanted_of_run(source), RunCollector, messages=messages).run(source)
-    names = ('time', *(name for name in UNITS if name != 'time'), *FrictionEstimate._fields[1:])
-    columns = {name: values for name in names if (values := getattr(run, name)) is not None}
-    known = [parse_snapshot(text).configuration for _, text in run.configurations[-1:]]
-    return Columns(columns, run.start, *known)
+    columns = Columns({name: values for name, values in vars(run).items() if isinstance(values, np.ndarray)})
+    columns.start = run.start
+    if run.configurations:
+        columns.configuration = parse_snapshot(run.configurations[-1][1]).configuration
+    return columns
 
 
-def _actuator(bag: Name, namespace: str, mapping: Name | None) -> 'ActuatorBag':
-    from seal_friction_ros.offline.bags.actuator_bag import open_actuator
+def _mapping(name: Name | None) -> 'MappingFile | None':
     from seal_friction_ros.offline.bags.mapped_bag import read_mapping
 
-    return open_actuator(Path(bag), namespace, None if mapping is None else read_mapping(str(mapping)))
-
-
-def _configuration(seals: Name | Sequence[Name], params: Name | None) -> Configuration | None:
-    """Configuration from seal files and a parameter file; None without both."""
-    from seal_friction_ros.offline.replay.replay import chosen_configuration
-
-    several = () if isinstance(seals, str | Path) else tuple(map(str, seals))
-    one = str(seals) if isinstance(seals, str | Path) else None
-    found = chosen_configuration(None if params is None else Path(params), one)
-    if not several:
-        return found
-    known = found or default_configuration()
-    return load_configuration(SealSelection(several), known.settings, known.feedforward, known.adaptation)
-
-
-# -- the estimator ----------------------------------------------------------------------------------------------------
+    return None if name is None else read_mapping(str(name))
 
 
 class Estimator:
@@ -219,7 +162,9 @@ class Estimator:
         *,
         configuration: Configuration | None = None,
     ) -> None:
-        chosen = configuration or _configuration(seals, params)
+        from seal_friction_ros.offline.replay.replay import chosen_configuration
+
+        chosen = configuration or chosen_configuration(params, seals)
         if chosen is None:
             raise ValueError('Estimator: no seals: name a seal file, or a parameter file with the parameter seals')
         self.configuration = chosen
@@ -237,10 +182,8 @@ class Estimator:
             sent: When it was sent, on the same clock [ns]; None: when it was received.
         """
         answers: list[Output] = []
-        receive(
-            self._parameters, self._state, message, message.stamp if received is None else received,
-            lambda answer, _: answers.append(answer), sent,
-        )  # fmt: skip
+        arrived = message.stamp if received is None else received
+        receive(self._parameters, self._state, message, arrived, lambda answer, _: answers.append(answer), sent)
         forces = [answer for answer in answers if isinstance(answer, FeedForward)]
         self.feedforward = forces[-1] if forces else self.feedforward
         return answers
@@ -259,7 +202,7 @@ class Estimator:
     ) -> FrictionEstimate:
         """Estimate at one sample; `feedforward` is then the newest one.
 
-        NaN, and a pressure of chamber a of NaN: there is no new sample of this input, and the last one holds until it
+        NaN: there is no new sample of this input (of both pressures, for ``pressure_a``); the last one holds until it
         is too old.
 
         Args:
@@ -274,15 +217,15 @@ class Estimator:
         """
         stamp = round(time * 1e9)
         inputs: tuple[tuple[float, Input], ...] = (
-            (pressure_a, Pressure(stamp, float(pressure_a), float(pressure_b))),
-            (force_sum, Force(stamp, float(force_sum))),
-            (temperature, Temperature(stamp, float(temperature))),
+            (pressure_a, records.Pressure(stamp, float(pressure_a), float(pressure_b))),
+            (force_sum, records.Force(stamp, float(force_sum))),
+            (temperature, records.Temperature(stamp, float(temperature))),
             (reference_velocity, ServoReference(stamp, 0.0, float(reference_velocity), float(reference_acceleration))),
         )
         for value, message in inputs:
             if not math.isnan(value):
                 self.receive(message)
-        answers = self.receive(Velocity(stamp, float(velocity)))
+        answers = self.receive(records.Velocity(stamp, float(velocity)))
         return next(answer for answer in answers if isinstance(answer, FrictionEstimate))
 
     def over(self, samples: Mapping[str, ArrayLike]) -> Columns:
@@ -291,8 +234,9 @@ class Estimator:
         Returns:
             ``time`` as given, the fields of ``FrictionEstimate.msg``, and ``feedforward_force``, NaN before the first.
         """
-        columns = {name: np.asarray(samples[name], float) for name in SAMPLES if name in samples}
-        if missing := [name for name in SAMPLES[:3] if name not in columns]:
+        known = [*signature(self.step).parameters]
+        columns = {name: np.asarray(samples[name], float) for name in known if name in samples}
+        if missing := [name for name in known[:3] if name not in columns]:
             raise ValueError(f'samples have no column {missing[0]}: there are {", ".join(columns) or "none"}')
         if len({column.shape for column in columns.values()}) > 1 or columns['time'].ndim != 1:
             raise ValueError('samples: the columns are not of one length')
@@ -300,13 +244,10 @@ class Estimator:
         for row in zip(*(column.tolist() for column in columns.values()), strict=True):
             estimates.append(self.step(**dict(zip(columns, row, strict=True))))
             forces.append(self.feedforward.force if self.feedforward else math.nan)
-        fields = FrictionEstimate._fields[1:]
-        found = {name: np.array([getattr(one, name) for one in estimates]) for name in fields}
-        time: FloatArray = columns['time']
-        return Columns({'time': time, **found, 'feedforward_force': np.array(forces)}, 0, self.configuration)
-
-
-# -- what the commands do ---------------------------------------------------------------------------------------------
+        made = {name: np.array([getattr(one, name) for one in estimates]) for name in FrictionEstimate._fields[1:]}
+        found = Columns({'time': columns['time'], **made, 'feedforward_force': np.array(forces)})
+        found.configuration = self.configuration
+        return found
 
 
 @_one_line
@@ -317,6 +258,7 @@ def replay(
     params: Name | None = None,
     out: Name | None = None,
     namespace: str = '',
+    workers: 'Workers' = 1,
 ) -> 'ReplayResult':
     """Replay a bag through the estimator: ``result.identical`` tells whether every recorded answer came out again.
 
@@ -326,14 +268,17 @@ def replay(
         params: ROS parameter file, in place of the recorded parameters.
         out: Bag to write with inputs and new answers; must not exist.
         namespace: As of `read_bag`.
+        workers: Processes that share a long bag.
     """
-    from seal_friction_ros.offline.replay.parallel_replay import verify
+    from seal_friction_ros.offline.replay.parallel_replay import verify, verify_shared
+    from seal_friction_ros.offline.replay.replay import chosen_configuration
     from seal_friction_ros.offline.replay.replay import replay as replay_and_write
 
-    override = _configuration(seals, params)
-    if out is None:
-        return verify(Path(bag), override, namespace)
-    return replay_and_write(Path(bag), override, Path(out), namespace)
+    override = chosen_configuration(params, seals)
+    if out is not None:
+        return replay_and_write(Path(bag), override, Path(out), namespace)
+    shared = verify_shared(Path(bag), namespace, workers) if override is None else None
+    return shared or verify(Path(bag), override, namespace)
 
 
 @_one_line
@@ -346,6 +291,7 @@ def compare(
     tolerances: Mapping[str, float | None] | None = None,
     topic: str = '',
     namespace: str = '',
+    mapping: Name | None = None,
 ) -> 'BagComparison':
     """Compare the messages of equal stamp in two bags: ``result.agree``, ``result.fields['friction_force'].largest``.
 
@@ -357,10 +303,13 @@ def compare(
         tolerances: Field that decides -> its absolute tolerance, None: ``atol``; by default the friction decides.
         topic: By default that of the friction estimates.
         namespace: As of `read_bag`.
+        mapping: As of `read_bag`.
     """
     from seal_friction_ros.offline.replay import compare as bags
 
-    return bags.compare(Path(a), Path(b), topic, atol, rtol, tolerances=tolerances, namespace=namespace)
+    return bags.compare(
+        Path(a), Path(b), topic, atol, rtol, tolerances=tolerances, namespace=namespace, mapping=_mapping(mapping)
+    )
 
 
 @_one_line
@@ -374,7 +323,9 @@ def identify(
     seal: Name | None = None,
     law: str | None = None,
     presliding: bool = False,
-    workers: int = 1,
+    namespace: str = '',
+    mapping: Name | None = None,
+    workers: 'Workers' = 1,
 ) -> 'Identification':
     """Identify a seal from bags, logs, tables or data sheets: ``result.document`` is the seal file, checked.
 
@@ -387,6 +338,8 @@ def identify(
         seal: Seal file with the geometry of the ring.
         law: Law to save instead of the recommended one.
         presliding: Identify the elasticity of the seals, too.
+        namespace: As of `read_bag`.
+        mapping: As of `read_bag`.
         workers: Processes; the result does not depend on their number.
     """
     from seal_friction_ros.offline.identification import pipeline
@@ -396,18 +349,20 @@ def identify(
     from seal_friction_ros.offline.work.targets import SEAL_FILE, checked_targets, mark
 
     places = [place_of(str(path)) for path in ([sources] if isinstance(sources, str | Path) else sources)]
-    of_sources = SourceOptions(rig=_text(rig), chambers=None if chambers is None else tuple(chambers))
-    options = pipeline.IdentifyOptions(sources=of_sources, seal=_text(seal), law=law, presliding=presliding)
+    of_sources = SourceOptions(
+        rig=None if rig is None else str(rig),
+        chambers=None if chambers is None else tuple(chambers),
+        namespace=namespace,
+        mapping=_mapping(mapping),
+    )
+    ring = None if seal is None else str(seal)
+    options = pipeline.IdentifyOptions(sources=of_sources, seal=ring, law=law, presliding=presliding)
     targets = [] if out is None else [(Path(out), SEAL_FILE)]
     with checked_targets('identify', targets, [place for place in places if isinstance(place, Path)], force=False):
         found = pipeline.identify(places, options, name, workers)
         for path, _ in targets:
             write_seal(found.document, path, f'Seal file, {mark("identify")}.')
     return found
-
-
-def _text(name: Name | None) -> str | None:
-    return None if name is None else str(name)
 
 
 @_one_line
@@ -420,6 +375,7 @@ def tune(
     out: Name | None = None,
     namespace: str = '',
     mapping: Name | None = None,
+    machine: Name | None = None,
 ) -> 'BagTuning | SimulatorTuning':
     """Tune the feed-forward: ``result.found.feedforward`` has its parameters, ``result.numbers`` what they are worth.
 
@@ -431,23 +387,27 @@ def tune(
         out: ROS parameter file to write.
         namespace: As of `read_bag`.
         mapping: As of `read_bag`.
+        machine: Parameter file of ``servo_simulator``, the simulated servo.
     """
+    from seal_friction_ros.offline.bags.actuator_bag import open_actuator
+    from seal_friction_ros.offline.replay.replay import chosen_configuration
     from seal_friction_ros.offline.tuning import tune as tuning
     from seal_friction_ros.offline.work.targets import PARAMETER_FILE, checked_targets
 
     targets = [] if out is None else [(Path(out), PARAMETER_FILE)]
     kind = TuningSettings if bag is None else RecordedAxisSettings
-    given, chosen = kind() if settings is None else settings, _configuration(seals, params)
+    given, chosen = kind() if settings is None else settings, chosen_configuration(params, seals)
     found: BagTuning | SimulatorTuning
     with checked_targets('tune', targets, [] if bag is None else [Path(bag)], force=False):
         if isinstance(given, TuningSettings) and bag is None:
-            found = tuning.tune_simulator(given, chosen)
+            servo = tuning.DEFAULT_MACHINE if machine is None else tuning.load_machine(Path(machine))
+            found = tuning.tune_simulator(given, chosen, servo)
         elif isinstance(given, RecordedAxisSettings) and bag is not None:
-            found = tuning.tune_bag(_actuator(bag, namespace, mapping), given, chosen)
+            found = tuning.tune_bag(open_actuator(Path(bag), namespace, _mapping(mapping)), given, chosen)
         else:
             raise ValueError(f'tune: settings are {type(given).__name__}, but {kind.__name__} are needed')
         for path, _ in targets:
-            tuning.write_parameters(path, found)
+            tuning.write_parameters(path, found, found.actuator)
     return found
 
 
@@ -455,5 +415,7 @@ def tune(
 def report(bag: Name, out: Name, *, namespace: str = '', mapping: Name | None = None) -> dict[str, Any]:
     """Write the page of a bag with figures and verdict to ``out`` (HTML); returns its numbers, as ``--json`` does."""
     from seal_friction_ros.offline.reports.bag_report import write_report
+    from seal_friction_ros.offline.work.targets import PAGE, checked_targets
 
-    return write_report(Path(bag), Path(out), namespace, _actuator(bag, namespace, mapping).mapping).numbers
+    with checked_targets('report', [(Path(out), PAGE)], [Path(bag)], force=False):
+        return write_report(Path(bag), Path(out), namespace, _mapping(mapping)).numbers

@@ -37,6 +37,9 @@ def test_the_lowest_versions_in_the_docs_are_those_that_are_tested():
         r'^(numpy|scipy|matplotlib|numba|Jinja2|PyYAML|mcap|rosbags|rich|tornado)==([\d.]+)', listed, re.MULTILINE
     ):
         assert f'{version}' in page, name
+    needed = re.findall(r"'([\w]+)>=([\d.]+)'", (ROOT / 'setup.py').read_text())
+    assert len(needed) > 8
+    assert [one for one in needed if '=='.join(one) not in re.findall(r'^[\w.=]+', listed, re.MULTILINE)] == []
 
 
 def test_the_launch_file_starts_the_node_with_an_argument_for_every_input():

@@ -38,6 +38,7 @@ FRAME = b'rod'
 _OUTPUTS = ('cylinder_pressure', 'force_sum', 'servo_reference', 'rod_position', 'rod_velocity')  # velocity last
 _LONGEST_CATCH_UP = 0.1  # [s] the simulation skips the time of a longer stall
 _SWITCH_INTERVAL = 2e-4  # [s] longest time that diagnostics delay a tick; Python's default is 5 ms
+_LOADED_WITHIN = 3.0  # [s] compiled code that is kept is loaded in this time
 _SECOND = 1_000_000_000  # [ns]
 _NORMAL_LIMITS = ('limited FORCE', 'limited SPOOL')  # a servo at full force or valve opening is no fault
 
@@ -65,7 +66,13 @@ class ServoSimulator(ManagedNode):
         if not has_compiler():
             self.get_logger().warning('numba is not installed: the simulation is slow; apt-get install python3-numba')
         self._period = round(_SECOND / self._settings.rate)
-        self._make_servo()
+        text = 'compiling the simulation, once: up to a minute'
+        said = threading.Timer(_LOADED_WITHIN, self.get_logger().info, [text])
+        said.start()
+        try:
+            self._make_servo()
+        finally:
+            said.cancel()
         self._joint = self.settings(StandardMessages).joint
         options = qos.overridable()
         for topic, kind in self._outputs_by_topic().items():

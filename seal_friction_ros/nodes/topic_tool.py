@@ -26,7 +26,7 @@ from seal_friction_ros.nodes.managed_node import message_class
 
 SUCCESS, REFUSED = 0, 1
 _NAME = 'seal_friction_topics'
-_LONGEST_ARRAY = 20  # numbers of a field that are printed
+_LONGEST_ARRAY = 20  # numbers of a field that a person reads; JSON has all
 
 
 class NotThereError(ValueError):
@@ -187,20 +187,26 @@ def filled(message: Any, values: Mapping[str, Any]) -> Any:
 
 
 def plain(value: Any) -> Any:
-    """A message as plain values; of a long array its beginning."""
+    """A message as plain values."""
     if hasattr(value, 'get_fields_and_field_types'):
         return {name: plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
-    if isinstance(value, bytes):
-        return list(value[:_LONGEST_ARRAY])
     if isinstance(value, str | bool | int | float):
         return value
-    items = list(value)
-    shown = [plain(item) for item in items[:_LONGEST_ARRAY]]
-    return [*shown, f'... {len(items) - _LONGEST_ARRAY} more'] if len(items) > _LONGEST_ARRAY else shown
+    return [plain(item) for item in value]
+
+
+def for_reading(value: Any) -> Any:
+    """Plain values for a person: of a long array its beginning."""
+    if isinstance(value, dict):
+        return {name: for_reading(item) for name, item in value.items()}
+    if not isinstance(value, list):
+        return value
+    shown = [for_reading(item) for item in value[:_LONGEST_ARRAY]]
+    return [*shown, f'... {len(value) - _LONGEST_ARRAY} more'] if len(value) > _LONGEST_ARRAY else shown
 
 
 def _yaml(value: Any) -> str:
-    text: str = yaml.safe_dump(value, sort_keys=False, allow_unicode=True, default_flow_style=None)
+    text: str = yaml.safe_dump(for_reading(value), sort_keys=False, allow_unicode=True, default_flow_style=None)
     return text.removesuffix('...\n').rstrip()
 
 

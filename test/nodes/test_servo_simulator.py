@@ -2,6 +2,9 @@
 
 import itertools
 import math
+import signal
+import subprocess
+import sys
 import time
 from contextlib import contextmanager
 
@@ -10,6 +13,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from harness.compensation import LIVE, SCALE
 from harness.counted_estimator import CountedEstimator
+from harness.processes import free_domain, graph_environment
 from harness.spin_nodes import SpunNodes, ros_context
 from paths import ROOT
 from rclpy.lifecycle import TransitionCallbackReturn
@@ -463,3 +467,18 @@ def test_deactivated_it_is_silent_and_starts_again_from_the_beginning():
         s.simulator.trigger_deactivate()
         s.simulator.trigger_cleanup()
         assert s.simulator.autostart()
+
+
+@pytest.mark.long  # compiles anew
+def test_it_says_that_it_compiles_at_the_first_start_and_no_more(tmp_path):
+    environment = graph_environment(free_domain()) | {'NUMBA_CACHE_DIR': str(tmp_path), 'PYTHONPATH': str(ROOT)}
+    command = [sys.executable, '-c', 'from seal_friction_ros.nodes import entry_points as e; e.servo_simulator()']
+    said = []
+    for _ in range(2):
+        with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) as process:
+            said.append('')
+            for line in process.stderr:
+                said[-1] += line
+                if 'simulating' in line:
+                    process.send_signal(signal.SIGINT)
+    assert ['compiling the simulation, once' in each for each in said] == [True, False], said

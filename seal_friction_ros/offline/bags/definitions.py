@@ -11,7 +11,7 @@ from typing import Any
 from seal_friction_ros.core.messages.definitions import Definition, full_name, parse_definition
 from seal_friction_ros.core.messages.layouts import PACKAGE
 from seal_friction_ros.files import share_directory
-from seal_friction_ros.packages import MissingPackageError, needed
+from seal_friction_ros.packages import needed
 
 _LINE = '=' * 80 + '\n'
 _HINT = 'run make setup, or source the colcon workspace'
@@ -44,10 +44,11 @@ def message_definition(type_name: str) -> tuple[str, str]:
 
 def _without_ros(type_name: str) -> tuple[str, str]:
     """As `message_definition`, without the package of the type."""
+    typesys = needed('rosbags.typesys')
     try:
         generated, _ = _typestore().generate_msgdef(type_name, ros_version=2)
-    except needed('rosbags.typesys').TypesysError:
-        raise ValueError(f'{type_name} is not installed, nor a type of ROS 2: {_HINT}') from None
+    except typesys.TypesysError:
+        raise ValueError(f'{type_name} is neither installed nor a type of ROS 2') from None
     main, *used = generated.split(_LINE)
     parts = [_commented(type_name, main)]
     for head, _, text in (part.partition('\n') for part in used):
@@ -108,9 +109,4 @@ def known_definition(type_name: str) -> str:
     """Definition of an installed type, or of one of ROS 2, which old SQLite bags lack; ValueError if it is neither."""
     with suppress(ValueError):
         return message_definition(type_name)[0]
-    try:
-        return _without_ros(type_name)[0]
-    except MissingPackageError:
-        raise
-    except ValueError:
-        raise ValueError('neither in the bag, nor installed, nor a type of ROS 2') from None
+    return _without_ros(type_name)[0]

@@ -71,28 +71,26 @@ def run_info(arguments: argparse.Namespace) -> int:
 
 def run_replay(arguments: argparse.Namespace) -> int:
     """Replay one bag, or several in parallel."""
-    from seal_friction_ros.offline.replay.parallel_replay import verify, verify_shared
-    from seal_friction_ros.offline.replay.replay import chosen_configuration, replay
+    from seal_friction_ros.api import replay
     from seal_friction_ros.offline.work.places import as_path
 
-    override = chosen_configuration(arguments.params, arguments.seal)
     if len(arguments.bags) > 1 or arguments.scheduler or arguments.work:
-        return _run_many(arguments, override)
-    namespace = arguments.namespace
+        return _run_many(arguments)
     with as_path(arguments.bags[0]) as bag:
-        if arguments.out:
-            result = replay(bag, override, arguments.out, namespace)
-        else:
-            shared = verify_shared(bag, namespace, cli.workers_of(arguments)) if override is None else None
-            result = shared or verify(bag, override, namespace)
+        result = replay(
+            bag, seals=arguments.seal or (), params=arguments.params, out=arguments.out,
+            namespace=arguments.namespace, workers=cli.workers_of(arguments),
+        )  # fmt: skip
     code = cli.DIFFERENT if arguments.verify and not result.identical else cli.SUCCESS
     return cli.print_result(arguments, result.numbers(), result.summary(verified=arguments.verify), code)
 
 
-def _run_many(arguments: argparse.Namespace, override: Any) -> int:
+def _run_many(arguments: argparse.Namespace) -> int:
     """Several bags: one line for each, and the exit code of the worst."""
     from seal_friction_ros.offline.replay.parallel_replay import replay_many
+    from seal_friction_ros.offline.replay.replay import chosen_configuration
 
+    override = chosen_configuration(arguments.params, arguments.seal)
     if arguments.out:
         raise ValueError('--out is for one bag on this machine: replay several bags one by one, without --work')
     workers, kept = cli.workers_of(arguments), cli.kept_in(arguments)
@@ -109,20 +107,20 @@ def _run_many(arguments: argparse.Namespace, override: Any) -> int:
 
 def run_compare(arguments: argparse.Namespace) -> int:
     """Compare messages of equal stamp, or with a page the friction of two runs or seals."""
-    mapping = cli.mapping_of(arguments)
     if arguments.out:
         from seal_friction_ros.offline.reports.comparison_report import write_comparison
 
         for option in ('topic', 'atol', 'rtol', 'fields'):
             if getattr(arguments, option):
                 raise ValueError(f'--{option} is for messages of equal stamp: leave it out, or leave out --out')
+        mapping = cli.mapping_of(arguments)
         report = write_comparison(arguments.a, arguments.b, arguments.out, arguments.namespace, mapping)
         return cli.print_result(arguments, report, f'{report.numbers["level"]}: {report.numbers["verdict"]}')
-    from seal_friction_ros.offline.replay.compare import compare
+    from seal_friction_ros.api import compare
 
     found = compare(
-        arguments.a, arguments.b, arguments.topic, arguments.atol, arguments.rtol,
-        namespace=arguments.namespace, mapping=mapping,
+        arguments.a, arguments.b, topic=arguments.topic, atol=arguments.atol, rtol=arguments.rtol,
+        namespace=arguments.namespace, mapping=arguments.mapping,
         tolerances=dict(_tolerance(text) for text in arguments.fields),
     )  # fmt: skip
     return cli.print_result(arguments, found.numbers(), found.summary(), cli.SUCCESS if found.agree else cli.DIFFERENT)

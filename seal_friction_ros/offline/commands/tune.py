@@ -50,28 +50,23 @@ def _settings() -> dict[str, Meaning]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Tune on the simulated servo or on a bag."""
+    from seal_friction_ros import api
     from seal_friction_ros.offline.bags.actuator_bag import open_actuator
-    from seal_friction_ros.offline.replay.replay import chosen_configuration
     from seal_friction_ros.offline.reports.tune_report import write_tuning_page
     from seal_friction_ros.offline.tuning import tune
     from seal_friction_ros.offline.tuning.recorded_command import read_output_gain
 
-    given = _given(arguments)
-    configuration = chosen_configuration(arguments.params, arguments.seal)
-    gain, actuator = None, arguments.actuator
-    if arguments.bag:
-        known = RecordedAxisSettings(**given)
+    settings, gain = (RecordedAxisSettings if arguments.bag else TuningSettings)(**_given(arguments)), None
+    if isinstance(settings, RecordedAxisSettings) and arguments.command_topic:
         axis = open_actuator(arguments.bag, arguments.namespace, cli.mapping_of(arguments))
-        if arguments.command_topic:
-            gain = read_output_gain(axis, arguments.command_topic, known)
-        tuning: Any = tune.tune_bag(axis, known, configuration)
-        actuator = actuator or tuning.actuator
-    else:
-        machine = tune.load_machine(arguments.machine) if arguments.machine else tune.DEFAULT_MACHINE
-        tuning = tune.tune_simulator(TuningSettings(**given), configuration, machine)
+        gain = read_output_gain(axis, arguments.command_topic, settings)
+    tuning = api.tune(
+        arguments.bag, settings=settings, seals=arguments.seal or (), params=arguments.params,
+        namespace=arguments.namespace, mapping=arguments.mapping, machine=arguments.machine,
+    )  # fmt: skip
     page = arguments.out.with_suffix('.html')
     numbers = {**tuning.numbers, 'file': arguments.out, 'page': page, 'figures': write_tuning_page(tuning, page)}
-    tune.write_parameters(arguments.out, tuning, actuator)
+    tune.write_parameters(arguments.out, tuning, arguments.actuator or tuning.actuator)
     text = tune.told(tuning)
     if gain is not None:
         numbers['output_gain'], numbers['output_gain_standard_error'] = gain.gain, gain.standard_error

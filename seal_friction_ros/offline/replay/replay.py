@@ -1,6 +1,6 @@
 """Replay of a bag through the estimator, without ROS graph or clock: byte for byte the answers of the live node."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -38,19 +38,23 @@ from seal_friction_ros.offline.replay.answer_comparison import AnswerStream, Rep
 from seal_friction_ros.offline.work.progress import counted, progress
 
 
-def chosen_configuration(params: Path | None, seal: str | Path | None) -> Configuration | None:
-    """Configuration from a ROS parameter file and a seal file for all seals; None if neither is given.
+def chosen_configuration(
+    params: str | Path | None, seals: str | Path | Sequence[str | Path] | None
+) -> Configuration | None:
+    """Configuration from a ROS parameter file, and a seal file for all seals or the parameter ``seals``; None: neither.
 
     ValueError: a file cannot be read, or a value is invalid.
     """
-    if params is None and seal is None:
+    if params is None and not seals:
         return None
     selection, feedforward, adaptation = SealSelection(), FeedForwardSettings(), DEFAULT_ADAPTATION
     settings = EstimatorSettings(stamp_age_max=0.0)  # off: stamps of a bag that was played are older than its receipt
     if params:
-        selection, settings, feedforward, adaptation = load_parameter_file(params)
-    if seal:
-        selection = with_seal(selection, str(seal))
+        selection, settings, feedforward, adaptation = load_parameter_file(Path(params))
+    if isinstance(seals, str | Path):
+        selection = with_seal(selection, str(seals))
+    elif seals:
+        selection = SealSelection(tuple(map(str, seals)))
     return load_configuration(selection, settings, feedforward, adaptation)
 
 

@@ -97,6 +97,7 @@ class SimulatorTuning:
     problem: TuningProblem
     found: Tuning
     plants: tuple[PlantOutcome, ...] = ()  # rigid, elastic, LuGre; empty if the seal files have no presliding
+    actuator: str = ''  # of a machine; the servo is none
 
     @property
     def result(self) -> str:

@@ -115,7 +115,7 @@ def test_without_ros_the_definitions_of_our_messages_are_the_same_to_the_byte(mo
     monkeypatch.setattr(definitions, 'find_spec', lambda _: None)
     message_definition.cache_clear()
     assert {kind: message_definition(kind) for kind in kinds} == installed
-    with pytest.raises(ValueError, match='a_msgs/msg/B is not installed, nor a type of ROS 2'):
+    with pytest.raises(ValueError, match='a_msgs/msg/B is neither installed nor a type of ROS 2'):
         message_definition('a_msgs/msg/B')
     message_definition.cache_clear()
 

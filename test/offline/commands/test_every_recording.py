@@ -11,10 +11,12 @@ from statistics import median
 from typing import Any
 from urllib.parse import urlsplit
 
+import numpy as np
 import pytest
 import yaml
-from harness.three_recordings import NAMES, PRESSURES, SAMPLES, SEALS, Recordings, friction, record
+from harness.three_recordings import MASS, NAMES, PRESSURES, SAMPLES, SEALS, Recordings, friction, record
 
+from seal_friction_ros import RecordedAxisSettings, read_bag, tune
 from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE, FEEDFORWARD_TYPE, VELOCITY_TYPE
@@ -227,3 +229,20 @@ def test_each_actuator_alone_replays_to_the_bytes_that_its_machine_sent(machine,
             made[answer.type_name].append(answer.data)
     assert samples == len(made[ESTIMATE_TYPE]) == SAMPLES
     assert made == recorded
+
+
+@each_kind
+def test_the_python_interface_takes_it_too(recordings, kind):
+    (bag, given), (own, _) = (options_of(recordings, which) for which in (kind, 'own'))
+    run, reference = read_bag(bag, **given), read_bag(own)
+    for name in ('velocity', 'pressure_a', 'force_sum', 'friction_force', 'status', 'adaptation_scale'):
+        assert np.array_equal(run[name], reference[name]), name
+    tuned = tune(bag, settings=RecordedAxisSettings(mass=MASS), **given)
+    assert tuned.numbers['friction_over_model'] == pytest.approx(true_scale(), rel=0.1)
+    assert tuned.actuator == given.get('namespace', '')
+
+
+def options_of(recordings: Recordings, kind: str) -> tuple[str, dict[str, str]]:
+    """A bag and the options that name its actuator, as arguments of Python."""
+    bag, options = recordings.arguments(kind)
+    return bag, {name.removeprefix('--'): value for name, value in zip(options[::2], options[1::2], strict=True)}
