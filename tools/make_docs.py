@@ -72,7 +72,7 @@ SEAL_PARTS = (
     PressureAsymmetry,
     Uncertainty,
 )
-"""Parts of a seal file, with short tables: a number out of bounds is an error that names the bound."""
+"""Parts of a seal file. No table has bounds: a number out of bounds is an error that names the bound."""
 
 
 LUBRICATION_PARTS = {
@@ -98,23 +98,18 @@ ORING_PARTS = {
     'measured': MeasuredFriction,
     'numerics': OringNumerics,
 }
-HEAD = ('| name | unit | default | bounds | meaning |', '|---|---|---|---|---|')
 
 
-def _rows(record_type: type, part: str = '') -> list[str]:
-    """Rows of a part of a case, each name after that of its part and a dot."""
-    prefix = f'{part}.' if part else ''
-    found = []
-    for name, meaning in meanings(record_type).items():
-        default = _default(record_type, name)
-        bounds = meaning.bounds_text()
-        found.append(f'| `{prefix}{name}` | {meaning.unit} | {default} | {bounds} | {meaning.description} |')
-    return found
-
-
-def case_table(parts: Mapping[str, type]) -> str:
-    """Markdown table of every key of a case file, as PART.KEY."""
-    return '\n'.join((*HEAD, *(row for part, record in parts.items() for row in _rows(record, part))))
+def table(parts: Mapping[str, type]) -> str:
+    """Markdown table of every key of a case file, as PART.KEY, without bounds."""
+    rows = ['| key [unit] | meaning |', '|---|---|']
+    for part, record in parts.items():
+        for name, meaning in meanings(record).items():
+            default = _default(record, name)
+            text = f'{meaning.description} Default {default}.' if default else meaning.description
+            unit = f' [{meaning.unit}]' if meaning.unit.removeprefix('1') else ''
+            rows.append(f'| `{part and f"{part}."}{name}`{unit} | {text} |')
+    return '\n'.join(rows)
 
 
 def node_parameters(groups: Iterable[ParameterGroup]) -> str:
@@ -193,17 +188,6 @@ def _subparsers(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentP
     return {name: kind for action in actions for name, kind in action.choices.items()}
 
 
-def table(record_type: type) -> str:
-    """Markdown table of the keys of a part of a seal file, without bounds."""
-    rows = ['| key [unit] | meaning |', '|---|---|']
-    for name, meaning in meanings(record_type).items():
-        default = _default(record_type, name)
-        text = f'{meaning.description} Default {default}.' if default else meaning.description
-        unit = f' [{meaning.unit}]' if meaning.unit.removeprefix('1') else ''
-        rows.append(f'| `{name}`{unit} | {text} |')
-    return '\n'.join(rows)
-
-
 def _default(record_type: type, name: str) -> str:
     default = {field.name: field.default for field in dataclasses.fields(record_type)}[name]
     return '' if default is dataclasses.MISSING else f'`{_yaml(default)}`'
@@ -225,7 +209,8 @@ def friction_laws() -> str:
         others = ', '.join(f'`{key}`' for key in sorted(keys_of_law(law) - {law.PART or law.NAME}))
         text = f'### `coulomb_law: {law.NAME}`\n\n{_markdown(about)}'
         text += f' It takes {others}.' if others else ''
-        text += f'\n\nUnder `{law.PART or law.NAME}`:\n\n{table(law)}' if meanings(law) else ''
+        keys = table({'': law})
+        text += f'\n\nUnder `{law.PART or law.NAME}`:\n\n{keys}' if meanings(law) else ''
         sections.append(text)
     return '\n\n'.join(sections)
 
@@ -283,9 +268,9 @@ def machine_inputs() -> str:
 
 def filled(text: str) -> str:
     """Text of a page with every table in it made anew."""
-    tables = {record_type.__name__: table(record_type) for record_type in SEAL_PARTS}
+    tables = {record_type.__name__: table({'': record_type}) for record_type in SEAL_PARTS}
     tables['friction_laws'] = friction_laws()
-    tables |= {'lubrication_case': case_table(LUBRICATION_PARTS), 'oring_case': case_table(ORING_PARTS)}
+    tables |= {'lubrication_case': table(LUBRICATION_PARTS), 'oring_case': table(ORING_PARTS)}
     tables['machine_inputs'] = machine_inputs()
     tables['commands'] = commands()
     tables['friction_estimator'] = node_parameters(FRICTION_ESTIMATOR_PARAMETERS)
