@@ -206,7 +206,7 @@ class Estimator:
         is too old.
 
         Args:
-            time: [s], increasing.
+            time: [s], finite and increasing.
             velocity: [m/s] of the rod.
             pressure_a: [Pa, gauge]
             pressure_b: [Pa, gauge]
@@ -215,6 +215,8 @@ class Estimator:
             reference_acceleration: [m/s^2] wanted.
             temperature: [degC] of the seals.
         """
+        if not math.isfinite(time):
+            raise ValueError(f'time = {time} s is not finite: give the time of the sample')
         stamp = round(time * 1e9)
         inputs: tuple[tuple[float, Input], ...] = (
             (pressure_a, records.Pressure(stamp, float(pressure_a), float(pressure_b))),
