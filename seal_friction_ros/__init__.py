@@ -4,6 +4,7 @@ The names below are the Python interface, see `seal_friction_ros.api`. They load
 of the package itself loads nothing.
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -20,8 +21,6 @@ if not TYPE_CHECKING:  # a type checker knows the names, and that there are no o
     def __getattr__(name: str) -> Any:
         if name not in __all__:
             raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
-        from importlib import import_module  # noqa: PLC0415  the package itself loads nothing
-
         return getattr(import_module('seal_friction_ros.api'), name)
 
     def __dir__() -> list[str]:

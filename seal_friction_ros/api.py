@@ -54,6 +54,7 @@ def _one_line(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
     @wraps(function)
     def called(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+        """The function, with errors of one line."""
         keep_compiled_code()
         try:
             return function(*args, **kwargs)

@@ -110,4 +110,4 @@ QUICK = ('estimator_in_my_loop', 'friction_of_a_seal', 'replay_in_ci')
     ],
 )
 def test_the_examples_run_with_the_wheel(source: Path, python: Path, example: str, tmp_path: Path):
-    run(python, source / 'examples' / f'{example}.py', folder=tmp_path)
+    assert run(python, source / 'examples' / f'{example}.py', folder=tmp_path)  # it asserts its numbers, and says some

@@ -7,6 +7,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 from builtin_interfaces.msg import Time
@@ -15,7 +16,7 @@ from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from seal_friction_ros.core.estimation.configuration import SealSelection
-from seal_friction_ros.core.foundation.compiled import has_compiler
+from seal_friction_ros.core.foundation.compiled import before_compiling, has_compiler
 from seal_friction_ros.core.foundation.parameters import ParameterGroup
 from seal_friction_ros.core.friction.force_sum_correction import NO_CORRECTION, measured_force_sum, one_correction
 from seal_friction_ros.core.messages.coder import decode, encode
@@ -38,7 +39,6 @@ FRAME = b'rod'
 _OUTPUTS = ('cylinder_pressure', 'force_sum', 'servo_reference', 'rod_position', 'rod_velocity')  # velocity last
 _LONGEST_CATCH_UP = 0.1  # [s] the simulation skips the time of a longer stall
 _SWITCH_INTERVAL = 2e-4  # [s] longest time that diagnostics delay a tick; Python's default is 5 ms
-_LOADED_WITHIN = 3.0  # [s] compiled code that is kept is loaded in this time
 _SECOND = 1_000_000_000  # [ns]
 _NORMAL_LIMITS = ('limited FORCE', 'limited SPOOL')  # a servo at full force or valve opening is no fault
 
@@ -66,13 +66,8 @@ class ServoSimulator(ManagedNode):
         if not has_compiler():
             self.get_logger().warning('numba is not installed: the simulation is slow; apt-get install python3-numba')
         self._period = round(_SECOND / self._settings.rate)
-        text = 'compiling the simulation, once: up to a minute'
-        said = threading.Timer(_LOADED_WITHIN, self.get_logger().info, [text])
-        said.start()
-        try:
+        with before_compiling(partial(self.get_logger().info, 'compiling the simulation, once: up to a minute')):
             self._make_servo()
-        finally:
-            said.cancel()
         self._joint = self.settings(StandardMessages).joint
         options = qos.overridable()
         for topic, kind in self._outputs_by_topic().items():

@@ -178,11 +178,11 @@ def filled(message: Any, values: Mapping[str, Any]) -> Any:
         if isinstance(value, Mapping):
             filled(old, value)
             continue
-        if isinstance(old, float) and type(value) is int:
-            value = float(value)  # noqa: PLW2901  a whole number stands for the number that ROS wants
-        if isinstance(old, bool | int | float | str) and type(value) is not type(old):
-            raise ValueError(f'{name}: {value!r} is no {fields[name]}')
-        setattr(message, name, value)
+        stands_for_real = isinstance(old, float) and type(value) is int  # ROS wants 1.0 where a person writes 1
+        new = float(value) if stands_for_real else value
+        if isinstance(old, bool | int | float | str) and type(new) is not type(old):
+            raise ValueError(f'{name}: {new!r} is no {fields[name]}')
+        setattr(message, name, new)
     return message
 
 

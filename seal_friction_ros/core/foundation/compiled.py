@@ -18,7 +18,8 @@ import dataclasses
 import inspect
 from bisect import bisect_right
 from collections import namedtuple
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import cache, partial
 from pkgutil import resolve_name
 from types import FunctionType
@@ -84,6 +85,32 @@ def _compile_alone(made: Any, compile_function: Callable[[Any], Any], name: str,
 
         made._cache = NullCache()
         return compile_function(signature)
+
+
+@contextmanager
+def before_compiling(tell: Callable[[], object]) -> Iterator[None]:
+    """Call ``tell`` once, if the block compiles anything; compiled code that is loaded from disk does not count."""
+    if not has_compiler():
+        yield
+        return
+    from numba.core import event
+
+    class Once(event.Listener):
+        """Tells at the beginning of the first function."""
+
+        told = False
+
+        def on_start(self, _event: Any) -> None:
+            """Numba begins to compile a function."""
+            if not self.told:
+                self.told = True
+                tell()
+
+        def on_end(self, _event: Any) -> None:
+            """Numba has compiled it."""
+
+    with event.install_listener('numba:compile', Once()):
+        yield
 
 
 def make_known() -> None:

@@ -54,6 +54,7 @@ NEGLIGIBLE_LOSS = 0.01  # of the loss: for less, no term is added (our choice)
 INTERVALS = (1, 2, 3, 4, 6, 8, 12)  # of the spline
 ROWS_PER_KNOT = 8  # means of `MEAN_OVER`; our choice
 EXPONENTS = (2.0 / 3.0, 1.0, 1.5, 2.0)  # of the pressure
+STRIBECK_SPEEDS = (0.05, 0.15, 0.4)  # of the fastest speed
 _RIDGE = 1e-10  # of the squared length of a column: keeps a collinear fit finite
 
 
@@ -371,14 +372,23 @@ def _pressure_terms(means: _Means, chambers: Sequence[str]) -> tuple[_Terms, _Ch
     return terms, [(), *((i,) for i in range(len(terms)))]
 
 
+def _speed_terms(means: _Means) -> tuple[_Terms, _Choices]:
+    """Friction over speed: none, viscous, viscous and Stribeck."""
+    fastest = float(np.quantile(means.speed, 0.95))
+    scales = [share * fastest for share in STRIBECK_SPEEDS]
+    falling = [(f'Stribeck {scale:.3g} m/s', np.exp(-means.speed / scale)) for scale in scales]
+    return [('viscous', means.speed), *falling], [(), (0,), *((0, i + 1) for i in range(len(falling)))]
+
+
 def _choose(means: _Means, chambers: Sequence[str], low: float, high: float) -> _Model:
     """The simplest model within one standard error of the best on left-out pairs of strokes."""
     inertia = means.of(_inertia_terms(means.position - (low + high) / 2.0, means.velocity, means.sample_acceleration))
-    over_pressure, pressures = _pressure_terms(means, chambers)
-    terms = [('constant', np.ones(len(inertia))), *over_pressure, ('viscous', means.speed)]
+    (over_pressure, pressures), (over_speed, speeds) = _pressure_terms(means, chambers), _speed_terms(means)
+    terms = [('constant', np.ones(len(inertia))), *over_pressure, *over_speed]
     friction = means.direction[:, np.newaxis] * np.column_stack([column for _, column in terms])
-    viscous = (len(terms) - 1,)
-    frictions = [(0, *(1 + i for i in p), *v) for p, v in product(pressures, ((), viscous))]
+    frictions = [
+        (0, *(1 + i for i in p), *(1 + len(over_pressure) + i for i in v)) for p, v in product(pressures, speeds)
+    ]
     needed = ROWS_PER_KNOT * (INTERVALS[0] + 3)
     if len(means.force) < needed:
         raise ValueError(

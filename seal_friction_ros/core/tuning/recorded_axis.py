@@ -186,11 +186,11 @@ def feedforward_force(settings: FeedForwardSettings, recording: Recording, frict
     references = recording.reference_velocity, recording.reference_acceleration, recording.reference_age
     state, forces = FADED_IN, []
     samples = zip(grounds, *(column.tolist() for column in (*columns, *references)), strict=True)
-    for ground, stamp, coulomb, velocity, *motion, age in samples:
+    for ground, stamp, coulomb, measured, *motion, age in samples:
         friction = (1.0 + friction_error) * coulomb if is_usable[ground] else -1.0
+        velocity = measured
         if not settings.use_measured_velocity:
-            late = abs(age) > settings.reference_timeout
-            velocity = math.nan if late else wanted_velocity(settings, *motion)  # noqa: PLW2901  in its place
+            velocity = math.nan if abs(age) > settings.reference_timeout else wanted_velocity(settings, *motion)
         state, out = feedforward.step(settings, state, stamp, stamp, friction, velocity)
         forces.append(out.force)
     return np.array(forces)
