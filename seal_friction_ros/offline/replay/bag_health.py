@@ -106,7 +106,7 @@ def bag_health(
 
 _REASONS = {
     admission.OLD_STAMP: Status.STAMP_NOT_INCREASING,
-    'no pressure or no force sum yet': Status.PRESSURE_MISSING | Status.FORCE_MISSING,
+    admission.NOT_STARTED: Status.PRESSURE_MISSING | Status.FORCE_MISSING,
     admission.NOT_FINITE: Status.PRESSURE_NOT_FINITE | Status.FORCE_NOT_FINITE | Status.VELOCITY_NOT_FINITE,
     admission.BAD_INPUT: Status.PRESSURE_STALE | Status.FORCE_STALE | Status.PRESSURE_OUT_OF_RANGE
     | Status.FORCE_OUT_OF_RANGE | Status.VELOCITY_OUT_OF_RANGE | Status.PRESSURE_LEAP | Status.FORCE_LEAP
