@@ -158,6 +158,17 @@ ATTACKS: dict[str, Callable[[Rod], Rod]] = {
     'Stribeck friction that the file has not': lambda rod: with_friction(
         rod, rod.friction * (1.0 + 0.4 * _slides(rod) * np.exp(-((rod.velocity / 0.02) ** 2)))
     ),
+    **{
+        f'friction by 30 % over {way * 1e3:.0f} mm': (
+            lambda rod, way=way: with_friction(rod, rod.friction * (1.0 + 0.3 * np.sin(2 * np.pi * rod.position / way)))
+        )
+        for way in (0.05, 0.005)
+    },
+    'friction halves at 15 s': lambda rod: with_friction(rod, rod.friction * np.where(rod.time > 15.0, 0.5, 1.0)),
+    'friction jumps by 30 % every 5 s': lambda rod: with_friction(
+        rod, rod.friction * (1.0 + 0.3 * (rod.time // 5.0 % 2))
+    ),
+    'load swings at 0.7 Hz': lambda rod: with_load(rod, 0.4 * COULOMB * np.sin(2.0 * np.pi * 0.7 * rod.time)),
     'velocity 10 ms late': lambda rod: replace(rod, velocity=late(rod.velocity, 10)),
     'force sum 20 ms late': lambda rod: replace(rod, force_sum=late(rod.force_sum, 20)),
     'encoder of 5 um': lambda rod: counted(rod, 5e-6),
@@ -187,7 +198,7 @@ def attacked(name: str, mode: str, seconds: float) -> Found:
         stamp = 10**12 + i * round(PERIOD * 1e9)
         sample = RodSample(stamp, velocity, Pressure(stamp, PRESSURE, PRESSURE), Force(stamp, force))
         state, estimate = step(parameters, state, sample)
-        rows.append((estimate.status, estimate.friction_force, estimate.coulomb_friction_std))
+        rows.append((estimate.status, estimate.friction_force, estimate.friction_force_std))
     first = round(SKIPPED / PERIOD)
     status, friction, std = np.array(rows)[first:].T
     good = status == 0

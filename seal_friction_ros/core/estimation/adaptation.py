@@ -391,9 +391,8 @@ def friction_of_sliding(
 
     With ``uses`` it is the mean and the standard deviation of the posterior, once the motion has told the friction;
     beyond the bounds of the scale it contradicts.
-    Without, the friction is that of the file and misses the posterior by m; the band that holds 95 % of a normal
-    distribution about m is :math:`(|m| + 1.64 \sigma) / 1.96` where that is wider. More than twice both deviations
-    contradict.
+    Without, the friction is that of the file, and its band holds the posterior (`_about`). More than twice both
+    deviations contradict.
 
     Args:
         settings: With the bounds.
@@ -423,8 +422,8 @@ def friction_of_sliding(
         )
         return adapted, direction * found, law > 0.0 and sliding != found
     missed, doubt = found - law, file_std * file_std + known.friction_std * known.friction_std
-    wider = (abs(sliding - law) + ONE_SIDED_95 * std) / BAND_95
-    adapted = ActuatorFriction(coulomb, std if std > wider else wider, stiction, is_in_range, added, asymmetry)
+    std = _about(abs(sliding - law), std)
+    adapted = ActuatorFriction(coulomb, std, stiction, is_in_range, added, asymmetry)
     return adapted, direction * found, is_proven and law > 0.0 and missed * missed > 4.0 * doubt
 
 
@@ -436,12 +435,13 @@ def friction_at_rest(
     stamp: int,
     force_sum: float,
     uses: bool,
-) -> tuple[ActuatorFriction, bool]:
+) -> tuple[ActuatorFriction, float, bool]:
     """Friction of a rod at rest by what is learnt, and whether that, or this rest, contradicts the estimate.
 
-    The standard deviation is that of the force sum less its offset, at most the breakaway force, since friction at rest
-    is no larger. A rest under the breakaway force contradicts, and as `friction_of_sliding` says; so does an offset of
-    more than half the breakaway force where nothing takes it off.
+    The standard deviation of the friction that acts is that of the force sum less its offset, at most the breakaway
+    force, since friction at rest is no larger; that of Coulomb friction is the one of sliding, or this if wider. A rest
+    under the breakaway force contradicts, and as `friction_of_sliding` says; so does an offset of more than half the
+    breakaway force where nothing takes it off.
 
     Args:
         settings: With the bounds.
@@ -450,6 +450,9 @@ def friction_at_rest(
         stamp: [ns] of the sample.
         force_sum: [N]
         uses: Whether the estimate uses what is learnt.
+
+    Returns:
+        Friction of the estimate; standard deviation of the friction that acts [N]; whether something contradicts.
     """
     coulomb, file_std, added = friction.coulomb_friction, friction.coulomb_friction_std, friction.velocity_friction
     stiction, asymmetry, is_in_range = friction.stiction, friction.breakaway_asymmetry, friction.in_identified_range
@@ -459,18 +462,32 @@ def friction_at_rest(
     scale = sliding / law if law > 0.0 else 1.0
     std = _std_at_rest(state, stamp, force_sum, scale * (coulomb + stiction))
     std = std if std > LEAST_STD * law else LEAST_STD * law
+    coulomb_std = _std_of_sliding(known, known.speed, law, file_std)
     is_pressed, can_contradict = state.rest.pressed > LONGEST_PRESS, outlook.is_proven and law > 0.0
     if uses and outlook.is_proven:
         at_no_speed = bounded_friction(settings, known, 0.0, 0.0, coulomb)
+        coulomb_std = coulomb_std if coulomb_std > std else std
         adapted = ActuatorFriction(
-            at_no_speed, std, stiction * scale, is_in_range, sliding - at_no_speed, asymmetry * scale
+            at_no_speed, coulomb_std, stiction * scale, is_in_range, sliding - at_no_speed, asymmetry * scale
         )
-        return adapted, is_pressed or (can_contradict and sliding != found)
+        return adapted, std, is_pressed or (can_contradict and sliding != found)
     missed, doubt = found - law, file_std * file_std + known.friction_std * known.friction_std
-    wider = (abs(outlook.offset) + ONE_SIDED_95 * std) / BAND_95
-    adapted = ActuatorFriction(coulomb, std if std > wider else wider, stiction, is_in_range, added, asymmetry)
+    std = _about(abs(outlook.offset), std)
+    coulomb_std = _about(abs(sliding - law), coulomb_std)
+    coulomb_std = coulomb_std if coulomb_std > std else std
+    adapted = ActuatorFriction(coulomb, coulomb_std, stiction, is_in_range, added, asymmetry)
     contradicts = abs(outlook.offset) > 0.5 * (coulomb + stiction) or missed * missed > 4.0 * doubt
-    return adapted, is_pressed or (can_contradict and contradicts)
+    return adapted, std, is_pressed or (can_contradict and contradicts)
+
+
+@compilable
+def _about(missed: float, std: float) -> float:
+    r"""Standard deviation about a value that misses the mean by m: its 95 % hold 95 % of a normal distribution [N].
+
+    It is :math:`(|m| + 1.64 \sigma) / 1.96` where that is wider.
+    """
+    wider = (missed + ONE_SIDED_95 * std) / BAND_95
+    return std if std > wider else wider
 
 
 @compilable
@@ -493,8 +510,20 @@ def _std_of_sliding(known: FrictionFilter, speed: float, law: float, file_std: f
     stribeck = STRIBECK * law * STRIBECK_SPEED / (STRIBECK_SPEED + speed)
     std = known.friction_std * (law / known.friction if law > known.friction else 1.0)
     least = LEAST_STD * law
-    std = math.sqrt(std * std + stribeck * stribeck)
+    std = math.sqrt(std * std + stribeck * stribeck + _unexplained_square(known))
     return std if std > least else least
+
+
+@compilable
+def _unexplained_square(known: FrictionFilter) -> float:
+    """Square of what readings show beside the friction and may be friction, beyond a usual drift [N^2].
+
+    That is what the offset took since the last reversal and the drift just now, or all that is not explained.
+    """
+    unexplained = known.unexplained
+    newest = (unexplained.drift + known.strayed) * (unexplained.drift + known.strayed)
+    largest = newest if newest > unexplained.square else unexplained.square
+    return largest - unexplained.drift_square if largest > unexplained.drift_square else 0.0
 
 
 @compilable
@@ -507,7 +536,8 @@ def _std_at_rest(state: AdaptationState, stamp: int, force_sum: float, most: flo
     noise = change * change if change * change > rest.ripple else rest.ripple
     offset = spread.bb + way * (2.0 * spread.bg + way * spread.gg)
     remainder = known.terms.remainder  # at rest nothing tells it from the offset
-    variance = offset + remainder * remainder + rest.leapt + AT_ONCE * AT_ONCE * (known.unexplained.square + noise)
+    variance = offset + remainder * remainder + known.strayed * known.strayed + rest.leapt
+    variance += AT_ONCE * AT_ONCE * (known.unexplained.square + noise)
     std = math.sqrt(variance) if variance > 0.0 else 0.0
     return std if std < most else most
 

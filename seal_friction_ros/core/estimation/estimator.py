@@ -396,7 +396,8 @@ def estimate_at(
     if parameters.adapts:
         adapted, estimate = _estimate_with_learnt(parameters, state.adaptation, seen, friction)
     else:
-        adapted, estimate = friction, estimate_of(parameters, seen, friction, 1.0, 0.0, 0.0, 0.0)
+        std = friction.coulomb_friction_std
+        adapted, estimate = friction, estimate_of(parameters, seen, friction, std, 1.0, 0.0, 0.0, 0.0)
     state.shear, estimate = _with_sheared_seals(
         parameters, parameters.followed_elasticity, state, seen, adapted, estimate
     )
@@ -477,11 +478,12 @@ def _estimate_with_learnt(
     status, force_sum, left = seen.status | outlook.status, seen.force_sum, 0.0
     law = friction.coulomb_friction + friction.velocity_friction
     if velocity == 0.0:
-        adapted, contradicts = friction_at_rest(settings, known, friction, seen.stamp, force_sum, uses)
+        adapted, std, contradicts = friction_at_rest(settings, known, friction, seen.stamp, force_sum, uses)
         if uses and outlook.is_proven:
             force_sum -= outlook.offset
     else:
         adapted, found, contradicts = friction_of_sliding(settings, known, friction, velocity, uses)
+        std = adapted.coulomb_friction_std
         if not status & _NO_READING:
             left = force_sum - outlook.taken_off
             contradicts = contradicts or abs(left - found) > outlook.most
@@ -494,7 +496,7 @@ def _estimate_with_learnt(
     scale_std = outlook.scale_std
     if scale_std < 0.0:
         scale_std = friction.coulomb_friction_std / law if law > 0.0 else 0.0
-    return adapted, estimate_of(parameters, seen, adapted, outlook.scale, scale_std, outlook.unsteady_offset, left)
+    return adapted, estimate_of(parameters, seen, adapted, std, outlook.scale, scale_std, outlook.unsteady_offset, left)
 
 
 @compilable
@@ -562,7 +564,8 @@ def _moment_of_seals(
 @compilable
 def _with_shear(estimate: FrictionEstimate, sheared: ShearedFriction, velocity: float) -> FrictionEstimate:
     """Estimate with the friction of sheared seals; 0.0 as residual: there is none of this sample."""
-    std, left, status, direction = estimate.coulomb_friction_std, estimate.residual, estimate.status, estimate.direction
+    coulomb_std, std, left = estimate.coulomb_friction_std, estimate.friction_force_std, estimate.residual
+    status, direction = estimate.status, estimate.direction
     if left != 0.0:
         left += estimate.friction_force - sheared.force
     if velocity == 0.0:
@@ -570,7 +573,8 @@ def _with_shear(estimate: FrictionEstimate, sheared: ShearedFriction, velocity: 
     if velocity == 0.0 or not sheared.slides:
         status |= BITS.PRESLIDING
     return replace(
-        estimate, coulomb_friction_std=math.sqrt(std * std + sheared.std * sheared.std), friction_force=sheared.force,
+        estimate, coulomb_friction_std=math.sqrt(coulomb_std * coulomb_std + sheared.std * sheared.std),
+        friction_force_std=math.sqrt(std * std + sheared.std * sheared.std), friction_force=sheared.force,
         direction=direction, status=status, residual=left,
     )  # fmt: skip
 
@@ -668,6 +672,7 @@ def estimate_of(
     parameters: Any,
     seen: Observation,
     friction: ActuatorFriction,
+    std: float,
     scale: float,
     scale_std: float,
     offset: float,
@@ -675,7 +680,8 @@ def estimate_of(
 ) -> FrictionEstimate:
     """Second half of a step: friction that acts on the rod, from the friction of all seals at the pressure in use.
 
-    ``scale``, ``scale_std``, ``offset`` and ``residual`` [N] are what adaptation adds to the estimate.
+    ``std`` [N] is that of the friction that acts; ``scale``, ``scale_std``, ``offset`` and ``residual`` [N] are what
+    adaptation adds to the estimate.
     """
     velocity, status, coulomb = seen.velocity, seen.status, friction.coulomb_friction
     ahead = sign(velocity if velocity != 0.0 else seen.force_sum)
@@ -695,6 +701,7 @@ def estimate_of(
         breakaway_force=breakaway, friction_force=acting.friction_force, state=acting.state,
         direction=acting.direction, status=status, input_age=seen.input_age, adaptation_scale=scale,
         adaptation_scale_std=scale_std, adaptation_offset=offset, residual=residual,
+        friction_force_std=std if acting.state != UNKNOWN else -1.0,
     )  # fmt: skip
 
 

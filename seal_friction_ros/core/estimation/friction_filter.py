@@ -70,7 +70,7 @@ STEP_READINGS = 10  # outliers in a row to one side that make it one,
 FEWEST_OUTLIERS = 3  # or these before the rod turns
 STEP_OF_FRICTION = 0.5  # [-] standard deviation of the scale over that of the offset after a step, both as forces
 PROVEN = 0.25  # [-] share: standard deviation of the friction below which the motion has told it
-DRIFT_TIME = 0.1  # [s] over which white noise averages out of what is not explained
+DRIFT_TIME = 0.08  # [s] over which white noise averages out of what is not explained
 DRIFT_MEMORY = 10.0  # [s] over which the size of the rest is known
 LONGEST_STEP = 0.1  # [s] of motion that one sample stands for
 
@@ -157,6 +157,7 @@ class FrictionFilter(NamedTuple):
     speed: float  # [m/s] then
     stroke: float  # [m] way in this direction so far
     longest: float  # [m] way in one direction before
+    strayed: float  # [N] what readings in this direction have added to the offset: it may be friction until the next
     friction: float  # [N] by the law then
     friction_std: float  # [N] of the friction then
     innovation_std: float  # [N] of its innovation
@@ -174,6 +175,7 @@ NOT_BEGUN = FrictionFilter(
     speed=0.0,
     stroke=0.0,
     longest=SHORTEST_STROKE,
+    strayed=0.0,
     friction=0.0,
     friction_std=0.0,
     innovation_std=0.0,
@@ -303,13 +305,15 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
     moved = elapsed if elapsed < LONGEST_STEP else LONGEST_STEP
     kept, law = REMAINDER_TIME / (REMAINDER_TIME + elapsed), reading.friction
     fits = MISFIT_RANGE / (MISFIT_RANGE + 2.0 * abs(law - known.friction) / (law + known.friction))
-    stroke, longest = abs(reading.way), known.longest
+    stroke, longest, strayed = abs(reading.way), known.longest, 0.0
     if reading.direction == known.direction:
         stroke += known.stroke
+        strayed = known.strayed
     elif known.stroke > longest:
         longest = known.stroke
     s, c, k, a, b, g, n, u = known.terms
-    terms = Terms(s, c, k, a, b + reading.way * g, g, kept * n, fits * u)
+    offset = b + reading.way * g
+    terms = Terms(s, c, k, a, offset, g, kept * n, fits * u)
     covariance = _predicted(known, reading, fits, elapsed, moved, stroke if stroke > longest else longest)
     innovation = reading.force - expected(terms, reading)
     usual = known.unexplained.usual
@@ -341,6 +345,7 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
         abs(reading.velocity),
         stroke,
         longest,
+        strayed + terms.offset - offset if longest > SHORTEST_STROKE else 0.0,
         reading.friction,
         std,
         math.sqrt(variance),

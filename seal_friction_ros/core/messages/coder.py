@@ -69,8 +69,9 @@ def _struct_of_bytes(layout: Layout, data: bytes) -> struct.Struct:
     if length > LONGEST_FRAME:
         raise ValueError(f'header with a frame name of {length} bytes is not valid')
     known = struct_of(layout.message_type, length)
-    if len(data) < known.size and layout.older_numbers is not None:
-        known = struct_of(layout.message_type, length, numbers=layout.older_numbers)
+    for numbers in layout.older_numbers:
+        if len(data) < known.size:
+            known = struct_of(layout.message_type, length, numbers=numbers)
     if not known.size <= len(data) <= known.size + 3:  # some writers pad the whole to a multiple of 4
         raise ValueError(f'{len(data)} bytes where the message has {known.size}')
     return known

@@ -62,7 +62,7 @@ class Layout(NamedTuple):
     record: type  # named tuple: the stamp [ns], the numbers in the order of the message, and for some the frame name
     codes: str  # type of each number as of `struct`: d float64, I uint32, B uint8, b int8
     check: Check | None = None
-    older_numbers: int | None = None  # how many numbers the message had before it grew; None: it never grew
+    older_numbers: tuple[int, ...] = ()  # how many numbers the message had before it grew, most first
 
     @property
     def keeps_frame(self) -> bool:
@@ -94,7 +94,7 @@ LAYOUTS = (
     Layout(REFERENCE_TYPE, records.ServoReference, 'ddd'),
     Layout(TEMPERATURE_TYPE, records.Temperature, 'dd'),
     Layout(TICK_TYPE, records.WatchdogTick, 'd'),
-    Layout(ESTIMATE_TYPE, records.FrictionEstimate, 'ddddBbIddddd', lambda found: FrictionState(found.state), 8),
+    Layout(ESTIMATE_TYPE, records.FrictionEstimate, 'ddddBbIdddddd', lambda found: FrictionState(found.state), (12, 8)),
     Layout(FEEDFORWARD_TYPE, records.FeedForward, 'ddI'),
 )
 LAYOUT_OF = {layout.message_type: layout for layout in LAYOUTS}
@@ -160,8 +160,10 @@ def struct_of(type_name: str, *lengths: int, numbers: int | None = None) -> stru
 
 
 GROWN = {
-    layout.message_type: struct_of(layout.message_type, 1).size
-    - struct_of(layout.message_type, 1, numbers=layout.older_numbers).size
+    layout.message_type: tuple(
+        struct_of(layout.message_type, 1).size - struct_of(layout.message_type, 1, numbers=numbers).size
+        for numbers in layout.older_numbers
+    )
     for layout in LAYOUTS
 }
-"""By how many bytes each message is longer than it was; what it had before is its beginning."""
+"""By how many bytes each message is longer than it was, each time; what it had before is its beginning."""

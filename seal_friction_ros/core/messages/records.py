@@ -140,8 +140,8 @@ class FrictionEstimate(NamedTuple):
 
     stamp: int  # [ns] of the velocity sample
     coulomb_friction: float  # [N] magnitude of the friction of all seals while sliding
-    coulomb_friction_std: float  # [N] one standard deviation, for a new reading
-    breakaway_force: float  # [N] at least ``coulomb_friction``
+    coulomb_friction_std: float  # [N] one standard deviation of a new reading; at least ``friction_force_std``
+    breakaway_force: float  # [N] below ``coulomb_friction`` only where a seal has less friction in this direction
     friction_force: float  # [N] ``m a = force_sum - friction_force``
     state: int  # a `FrictionState`
     direction: int  # -1, 0 or 1
@@ -151,6 +151,7 @@ class FrictionEstimate(NamedTuple):
     adaptation_scale_std: float = 0.0  # [-] its standard deviation; 0.0 without adaptation
     adaptation_offset: float = 0.0  # [N] part of the force sum that does not change sign with the direction
     residual: float = 0.0  # [N] force sum less inertia, ``friction_force`` and offset; 0.0 at rest
+    friction_force_std: float = -1.0  # [N] one standard deviation of ``friction_force``; -1.0: not known
 
 
 NO_ESTIMATE = FrictionEstimate(NEVER, 0.0, 0.0, 0.0, 0.0, UNKNOWN, 0, 0, -1.0)

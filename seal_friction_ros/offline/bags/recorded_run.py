@@ -65,6 +65,7 @@ class RecordedRun:
     adaptation_scale_std: FloatArray  # [-]
     adaptation_offset: FloatArray  # [N]
     residual: FloatArray  # [N]
+    friction_force_std: FloatArray  # [N] -1.0: not known, as in a bag from before the message had it
     feedforward_force: FloatArray  # [N] that acted, published with the estimate; NaN where there is none
     replayed_force: FloatArray | None  # [N] feed-forward of a replay, which did not act; None: the bag is no replay
 

@@ -352,6 +352,7 @@ def situation(
     seals = [PLACEHOLDER] if known.has_placeholder else []
     decides = deciding([*present, *findings, *seals, _ESTIMATING])
     frame = getattr(held.records.get(Velocity), 'frame_id', b'')
+    std = max(estimate.friction_force_std, 0.0) or estimate.coulomb_friction_std  # an older bag has one for both
     return {
         'verdict': decides.level,
         'reason': decides.text,
@@ -361,7 +362,7 @@ def situation(
         'faults': [why] if cause else _faults(bits.status),
         'friction': finite(estimate.friction_force),
         'coulomb': finite(estimate.coulomb_friction),
-        'band': finite(BAND_95 * estimate.coulomb_friction_std),
+        'band': finite(BAND_95 * std),
         'measured': finite(measured_friction(known, held)[1]),
         'breakaway': finite(estimate.breakaway_force),
         'feedforward': None if feedforward is None else finite(feedforward.force),

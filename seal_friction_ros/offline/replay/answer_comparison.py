@@ -76,8 +76,8 @@ class AnswerStream:
         if self._discarded:
             self._count_difference(lambda: f'{name}: the ones before it were not recorded', self._discarded)
             self._discarded = 0
-        grown = GROWN.get(self.type_name, 0)
-        if grown and not self._grown and pending and len(data) == len(pending[0]) - grown:
+        grown = len(pending[0]) - len(data) if pending and not self._grown else 0
+        if grown in GROWN.get(self.type_name, ()):
             self._grown = grown
             pending = self.pending = deque(answer[: len(answer) - grown] for answer in pending)
         while data in islice(pending, 1, None) and data != pending[0]:  # some were not recorded

@@ -126,7 +126,7 @@ def compile_now(configurations: Iterable[Configuration] = ()) -> None:
         parameters = configuration.parameters()
         _, answers = receive_all(parameters, init(parameters), none)
     places = none.offsets, none.sizes
-    _compare(0, 0, False, (answers.data, *places), (none.data, *places), none.sizes, 0)
+    _compare(0, 0, False, (answers.data, *places), (none.data, *places), none.sizes, none.sizes)
     block_reader.compile_now()
 
 
@@ -190,7 +190,7 @@ class _BulkAnswerStream(AnswerStream):
             if not self.pending:
                 before = taken
                 taken, used, differing = _compare(
-                    taken, used, bool(self.first), ours, theirs, available, GROWN[self.type_name]
+                    taken, used, bool(self.first), ours, theirs, available, np.array(GROWN[self.type_name], np.int64)
                 )
                 self.recorded += taken - before
                 self.differing += differing
@@ -217,12 +217,12 @@ def _compare(
     ours: tuple[Bytes, Integers, Integers],
     theirs: tuple[Bytes, Integers, Integers],
     available: Integers,
-    grown: int,
+    grown: Integers,
 ) -> tuple[int, int, int]:
     """Compare recorded messages from number ``taken`` on with answers from number ``used`` on, in the simple case.
 
     The case is simple while they agree and, once the first difference has a text (``is_named``), while exactly one
-    answer waits. A recorded message may be ``grown`` [bytes] shorter, as it was before its type grew. Returns the
+    answer waits. A recorded message may be one of ``grown`` [bytes] shorter, as before its type grew. Returns the
     number of the first recorded message that is not simple, of the first answer that waits for it, and the number of
     differences.
     """
@@ -231,7 +231,7 @@ def _compare(
     differing = 0
     while taken < len(available) and used < available[taken]:
         size, first, second = recorded_sizes[taken], offsets[used], recorded_offsets[taken]
-        same = size in (sizes[used], sizes[used] - grown)
+        same = size == sizes[used] or sizes[used] - size in grown
         if same:
             for k in range(size):
                 if data[first + k] != recorded[second + k]:

@@ -119,7 +119,8 @@ def test_observe_publishes_what_is_learnt_and_leaves_the_friction_as_it_is():
     off, observed = (run(day, 20.0, known=parameters(mode)).estimates for mode in ('off', 'observe'))
     assert sliding(observed)[-1].adaptation_scale == pytest.approx(1.2, rel=0.05)
     changed = {
-        'coulomb_friction_std', 'status', 'adaptation_scale', 'adaptation_scale_std', 'adaptation_offset', 'residual',
+        'coulomb_friction_std', 'friction_force_std', 'status', 'adaptation_scale', 'adaptation_scale_std',
+        'adaptation_offset', 'residual',
     }  # fmt: skip
     for before, after in zip(off, observed, strict=True):
         a, b = before._asdict(), after._asdict()
@@ -128,7 +129,7 @@ def test_observe_publishes_what_is_learnt_and_leaves_the_friction_as_it_is():
 
 def test_off_every_number_is_that_of_the_file_and_nothing_is_learnt():
     found = run(replace(DAY, scale=lambda _: 1.5), 10.0, known=parameters('off'))
-    assert {estimate[-4:] for estimate in found.estimates} == {(1.0, 0.0, 0.0, 0.0)}
+    assert {estimate[-5:-1] for estimate in found.estimates} == {(1.0, 0.0, 0.0, 0.0)}
     assert found.state == NOT_ADAPTED
 
 
@@ -314,6 +315,21 @@ def test_what_drifts_in_one_direction_alone_is_in_the_band_or_said(what, mode):
     assert wrong(found, day) == 0.0
 
 
+@pytest.mark.parametrize('mode', ['observe', 'on'])
+@pytest.mark.parametrize(
+    'scale',
+    [
+        pytest.param(lambda time: 1.0 + 0.3 * math.sin(math.tau * 4.0 * time), id='waves 4 times a second'),
+        pytest.param(lambda time: 1.0 + 0.3 * math.sin(math.tau * 0.8 * time), id='waves 0.8 times a second'),
+        pytest.param(lambda time: 1.0 + 0.3 * (time // 5.3 % 2), id='jumps'),
+        pytest.param(lambda time: 1.0 if time < 20.5 else 0.5, id='halves'),
+    ],
+)
+def test_friction_that_changes_within_a_stroke_is_in_the_band_or_said(scale, mode):
+    day = replace(DAY, scale=scale, stroke_time=2.0, presliding=0.0, dip=0.0)
+    assert wrong(run(day, 40.0, known=parameters(mode)), day) <= 0.01
+
+
 def part_of_stroke(time: float) -> float:
     """Position of the rod over its stroke, after the trapezoids of `samples`."""
     into = time % DAY.stroke_time / DAY.stroke_time
@@ -448,7 +464,8 @@ def test_at_rest_the_band_holds_an_offset_of_the_force_sum(push, load, mode):
         estimates.append(estimate)
     for estimate in estimates[2030:]:
         assert estimate.state == STUCK
-        assert abs(estimate.friction_force - push * FRICTION) < 1.96 * estimate.coulomb_friction_std
+        assert abs(estimate.friction_force - push * FRICTION) < 1.96 * estimate.friction_force_std
+        assert estimate.friction_force_std <= estimate.coulomb_friction_std
         breakaway = estimate.adaptation_scale * (LAW.coulomb_friction + LAW.stiction)
         assert estimate.coulomb_friction_std <= 1.2 * breakaway
     on = estimates[-1].friction_force
@@ -456,9 +473,18 @@ def test_at_rest_the_band_holds_an_offset_of_the_force_sum(push, load, mode):
 
 
 def test_at_rest_before_any_motion_the_deviation_is_the_breakaway_force():
-    friction, contradicts = friction_at_rest(SETTINGS, NOT_ADAPTED, LAW_AT_40, START, 30.0, True)
-    assert friction.coulomb_friction_std == pytest.approx(50.0)
+    friction, std, contradicts = friction_at_rest(SETTINGS, NOT_ADAPTED, LAW_AT_40, START, 30.0, True)
+    assert std == friction.coulomb_friction_std == pytest.approx(50.0)
     assert not contradicts
+
+
+def test_at_rest_the_force_sum_tells_the_friction_that_acts_closer_than_the_coulomb_friction():
+    known = parameters()
+    state = estimator.init(known)
+    for sample in resting(DAY, 2.0, 0.0, -0.9 * FRICTION):  # as much as the last stroke left
+        state, estimate = step(known, state, sample)
+    assert estimate.status == 0
+    assert 0.0 < estimate.friction_force_std < 0.9 * estimate.coulomb_friction_std
 
 
 def test_a_rod_that_rests_under_more_than_the_breakaway_force_contradicts_the_law():
@@ -492,7 +518,7 @@ def wrong(found, day, seconds=5.0):
     truth = {sample.stamp: sample for sample in samples(replace(day, noise=0.0, mass=0.0, load=lambda _: 0.0), 60.0, 0)}
     return fmean(
         estimate.status == 0
-        and abs(estimate.friction_force - truth[estimate.stamp].force.force) > 1.96 * estimate.coulomb_friction_std
+        and abs(estimate.friction_force - truth[estimate.stamp].force.force) > 1.96 * estimate.friction_force_std
         for estimate in estimates
     )
 

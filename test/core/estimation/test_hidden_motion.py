@@ -85,7 +85,7 @@ def test_a_rod_that_vibrates_above_the_band_of_rest_is_not_known_to_rest(amplitu
 def test_a_rod_that_vibrates_has_no_wrong_friction_with_status_0(amplitude, frequency, rate, mass, load):
     found, friction = vibration(amplitude, frequency, rate, mass, load)
     wrong = [
-        e.status == 0 and abs(e.friction_force - f) > 1.96 * e.coulomb_friction_std
+        e.status == 0 and abs(e.friction_force - f) > 1.96 * e.friction_force_std
         for e, f in zip(found, friction, strict=True)
     ]
     assert np.mean(wrong[round(2.0 * rate) :]) <= 0.005

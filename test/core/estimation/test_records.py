@@ -42,6 +42,7 @@ def test_before_the_first_estimate_there_is_no_force_no_state_and_no_input():
             adaptation_scale_std=0.0,
             adaptation_offset=0.0,
             residual=0.0,
+            friction_force_std=-1.0,
         )
         == NO_ESTIMATE
     )

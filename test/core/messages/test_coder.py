@@ -165,7 +165,7 @@ def test_padding_is_zero(type_name):
         layouts.TEMPERATURE_TYPE: Temperature(stamp, ones, ones),
         layouts.TICK_TYPE: WatchdogTick(stamp, ones),
         layouts.FEEDFORWARD_TYPE: FeedForward(stamp, ones, ones, 0x01010101),
-        layouts.ESTIMATE_TYPE: FrictionEstimate(stamp, *[ones] * 4, FrictionState.SLIDING, 1, 0x01010101, *[ones] * 5),
+        layouts.ESTIMATE_TYPE: FrictionEstimate(stamp, *[ones] * 4, FrictionState.SLIDING, 1, 0x01010101, *[ones] * 6),
     }
     for length in range(41):
         data = SAMPLES[type_name][2](records[type_name], b'\x01' * length)
@@ -244,14 +244,13 @@ def test_a_damaged_message_is_refused_with_a_value_error_or_has_the_size_of_one(
     shortened = bytes(data[: len(data) - cut])
     if decode_or_refuse(type_name, shortened) is not None:
         # A damaged name length may move the end within the padding, no further: of the message, or as it was.
-        assert cut <= 7 or layouts.GROWN[type_name] - 10 <= cut <= layouts.GROWN[type_name] + 7
+        assert any(grown - 10 <= cut <= grown + 7 for grown in (0, *layouts.GROWN[type_name]))
 
 
 @STAMPED
 def test_every_truncation_is_refused(type_name):
     data = encode(type_name, b'rod')
-    grown = layouts.GROWN[type_name]
-    as_it_was = range(len(data) - grown, len(data) - grown + 4) if grown else ()
+    as_it_was = {len(data) - grown + padding for grown in layouts.GROWN[type_name] for padding in range(4)}
     for length in set(range(len(data))).difference(as_it_was):
         with pytest.raises(ValueError, match='bytes'):
             coder.DECODERS[type_name](data[:length])
@@ -261,9 +260,11 @@ START = 1_700_000_000_000_000_000  # [ns]
 
 
 def test_an_estimate_from_before_the_adaptation_is_read_with_nothing_learnt():
-    estimate = FrictionEstimate(START, 40.0, 4.0, 45.0, 40.0, FrictionState.SLIDING, 1, 0, 0.001, 1.2, 0.01, 5.0, -1.0)
+    learnt = (1.2, 0.01, 5.0, -1.0, 3.0)
+    estimate = FrictionEstimate(START, 40.0, 4.0, 45.0, 40.0, FrictionState.SLIDING, 1, 0, 0.001, *learnt)
     data = coder.encode(estimate, b'rod')
-    assert coder.decode(layouts.ESTIMATE_TYPE, data[:-32]) == (*estimate[:9], 1.0, 0.0, 0.0, 0.0)
+    assert coder.decode(layouts.ESTIMATE_TYPE, data[:-40]) == (*estimate[:9], 1.0, 0.0, 0.0, 0.0, -1.0)
+    assert coder.decode(layouts.ESTIMATE_TYPE, data[:-8]) == (*estimate[:13], -1.0)
 
 
 @STAMPED
