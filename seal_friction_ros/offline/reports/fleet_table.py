@@ -18,13 +18,7 @@ _OF_LEVEL = [f'level_{name}' for name in LEVEL_COLUMNS]
 def write_fleet_table(bags: Sequence[FleetBag], out: Path) -> None:
     """Write the table; SI units, null where a bag does not tell. A bag without a pressure level has one row.
 
-    Args:
-        bags: The bags.
-        out: Parquet file; an existing one is replaced.
-
-    Raises:
-        MissingPackageError: pyarrow is not installed.
-        ValueError: The file cannot be written.
+    An existing file is replaced. MissingPackageError: pyarrow is not installed; ValueError: the file cannot be written.
     """
     arrow, parquet = needed('pyarrow'), needed('pyarrow.parquet')
     kinds = dict.fromkeys(('bag', 'level', 'why', *_TEXTS), arrow.string()) | dict.fromkeys(_COUNTS, arrow.int64())

@@ -92,17 +92,13 @@ def _verdict(found: Identification, files: Sequence[str]) -> Verdict:
         parts = zip(found.data.kinds, told.friction.tolist(), told.apart_std.tolist(), strict=True)
         shares = [(kind.name, friction / total, std / total) for kind, friction, std in parts]
         return _verdict_on_kinds(selection.validation.error, shares, files)
-    numbers = verdicts.IdentificationNumbers(
-        law=selection.law.name,
-        error=selection.validation.error,
-        worst=worst_left_out(found.levels),
-        coverage=quality.coverage,
-        unsound=selection.fit.why_unsound,
-        outlier=found.data.outlier is not None,
-        changed=any(change.is_changed for change in quality.changes),
-        drifted=any(level.is_used and abs(level.drift) > diagnostics.SETTLED for level in found.levels),
-    )
-    return verdicts.of_identification(numbers)
+    remarks = {
+        'outlier': found.data.outlier is not None,
+        'changed': any(change.is_changed for change in quality.changes),
+        'drifted': any(level.is_used and abs(level.drift) > diagnostics.SETTLED for level in found.levels),
+    }
+    numbers = selection.validation.error, worst_left_out(found.levels), quality.coverage, selection.fit.why_unsound
+    return verdicts.of_identification(selection.law.name, *numbers, *filter(remarks.get, remarks))
 
 
 def _verdict_on_kinds(error: float, shares: Sequence[tuple[str, float, float]], files: Sequence[str]) -> Verdict:
