@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup
 
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.parameters import meanings
 from seal_friction_ros.core.foundation.units import BAR, MM, MPA, MS, PSI, UM
@@ -152,10 +153,7 @@ def write_page(
     page = render_page(template, pictures, data, warnings=list(warnings), **values)
     folder = out.parent / f'{out.stem}_figures'
     files = {folder / f'{name}.{kind}': data for name, kinds in rendered.items() for kind, data in kinds.items()}
-    try:
-        (folder if files else out.parent).mkdir(parents=True, exist_ok=True)
+    with named_errors(f'{out}: cannot write the page or its figures', OSError):
         for path, content in {**files, out: page.encode('utf-8', 'replace')}.items():
             write_whole(path, content)
-    except OSError as error:
-        raise ValueError(f'{out}: cannot write the page or its figures: {error.strerror or error}') from None
     return tuple(files)
