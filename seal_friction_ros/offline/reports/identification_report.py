@@ -49,13 +49,7 @@ _DIRECTIONS = ((1.0, style.BLUE, 'extending'), (-1.0, style.ORANGE, 'retracting'
 def write_identification_report(
     found: Identification, out: Path, files: Mapping[str, Path] | None = None
 ) -> tuple[Path, ...]:
-    """Write the report of an identification; result and errors as of `write_page`.
-
-    Args:
-        found: The identification.
-        out: HTML file.
-        files: Kind -> its seal file, of several kinds of seals.
-    """
+    """Write the report of an identification; ``files`` are those of several kinds of seals; else as `write_page`."""
     plots, kinds = identification_figures(found), kinds_numbers(found)
     names = {kind: path.name for kind, path in (files or {}).items() if kind}
     return write_page(
@@ -63,9 +57,7 @@ def write_identification_report(
         'identification',
         plots,
         verdict=_verdict(found, list(names.values())),
-        head=head_of(
-            'identify', ', '.join(file.name for file in found.data.sources.files[:3]), 'the data have no date'
-        ),
+        head=head_of('identify', ', '.join(one.name for one in found.data.sources.files[:3]), 'the data have no date'),
         warnings=found.warnings,
         worst=worst_left_out(found.levels),
         found=found,
@@ -169,30 +161,19 @@ def _ladder_table(found: Identification) -> Table:
 
 def _parameter_table(found: Identification) -> Table:
     selection, errors, breakaway = found.selection, found.quality.standard_errors, found.quality.breakaway
-    (first, fit), *others = selection.fits_by_name.items()
-    rows = [
-        (
-            f'{p.name}, {first}' if others else p.name,
-            p.symbol,
-            f'{fit.values[p.name]:.5g}',
-            f'{errors[p.name]:.2g}',
-            p.unit,
-        )
-        for p in selection.law.parameters
-    ]
+    (_, first), *others = selection.fits_by_name.items()
+    rows = []
+    for name, fit in selection.fits_by_name.items():
+        for p in selection.law.parameters:
+            spread = f'{errors[p.name]:.2g}' if fit is first else DASH
+            shown = f'{p.name}, {name}' if others else p.name
+            rows.append((shown, p.symbol, f'{fit.values[p.name]:.5g}', spread, p.unit))
     rows += [(name, '', f'{value:.5g}', 'not fitted', '') for name, value in selection.law.fixed.items()]
-    rows += [
-        (f'{p.name}, {name}', p.symbol, f'{other.values[p.name]:.5g}', DASH, p.unit)
-        for name, other in others
-        for p in selection.law.parameters
-    ]
     if breakaway is not None:
         values = zip(('constant', 'share'), breakaway[1:3], breakaway.standard_errors, ('N', '1'), strict=True)
-        rows += [
-            (f'breakaway above Coulomb, {part}', '', f'{value:.5g}', f'{error:.2g}', unit)
-            for part, value, error, unit in values
-            if value
-        ]
+        for part, value, error, unit in values:
+            if value:
+                rows.append((f'breakaway above Coulomb, {part}', '', f'{value:.5g}', f'{error:.2g}', unit))
     return Table(('parameter of one seal', 'symbol', 'value', 'standard error', 'unit'), rows, (0, 1, 4))
 
 
