@@ -110,9 +110,8 @@ def run_compare(arguments: argparse.Namespace) -> int:
     if arguments.out:
         from seal_friction_ros.offline.reports.comparison_report import write_comparison
 
-        for option in ('topic', 'atol', 'rtol', 'fields'):
-            if getattr(arguments, option):
-                raise ValueError(f'--{option} is for messages of equal stamp: leave it out, or leave out --out')
+        options = ('topic', 'atol', 'rtol', 'fields')
+        cli.check_only_for(arguments, options, 'messages of equal stamp: leave it out, or leave out --out')
         mapping = cli.mapping_of(arguments)
         report = write_comparison(arguments.a, arguments.b, arguments.out, arguments.namespace, mapping)
         return cli.print_result(arguments, report, f'{report.numbers["level"]}: {report.numbers["verdict"]}')

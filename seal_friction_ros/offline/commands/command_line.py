@@ -69,8 +69,7 @@ class Parser(argparse.ArgumentParser):
 
 def add_group(commands: Any, name: str, metavar: str, description: str, *examples: str) -> Any:
     """Add a command that has kinds, each with a parser of its own; returns the subparsers for them."""
-    parser = commands.add_parser(name, **_help(description, examples))
-    parser.set_defaults(examples=[f'seal_friction {example}' for example in examples])
+    parser = _new_parser(commands, name, description, examples)
     return parser.add_subparsers(title=f'{metavar.lower()}s', required=True, metavar=metavar)
 
 
@@ -87,18 +86,20 @@ def add_command(
     The ``examples`` are command lines for ``--help``, without ``seal_friction``. The command does not work without the
     optional packages that it ``needs``, though it could be imported.
     """
-    parser: argparse.ArgumentParser = commands.add_parser(name, **_help(description, examples))
+    parser = _new_parser(commands, name, description, examples)
     parser.add_argument('--json', action='store_true', help='print the numbers as one JSON object on stdout')
-    of_user = [f'seal_friction {example}' for example in examples]
-    parser.set_defaults(run=run, command=parser.prog.split()[1], targets={}, needs=needs, examples=of_user)
+    parser.set_defaults(run=run, command=parser.prog.split()[1], targets={}, needs=needs)
     return parser
 
 
-def _help(description: str, examples: Sequence[str]) -> dict[str, Any]:
-    """Description and examples for ``--help``."""
-    lines = ['examples:' if examples[1:] else 'example:', *(f'  seal_friction {example}' for example in examples)]
-    shown = {'help': description, 'description': description, 'epilog': '\n'.join(lines)}
-    return {**shown, 'formatter_class': argparse.RawDescriptionHelpFormatter}
+def _new_parser(commands: Any, name: str, description: str, examples: Sequence[str]) -> argparse.ArgumentParser:
+    of_user = [f'seal_friction {example}' for example in examples]
+    epilog = '\n  '.join(['examples:' if examples[1:] else 'example:', *of_user])
+    form: Any = argparse.RawDescriptionHelpFormatter
+    shown = {'help': description, 'description': description, 'epilog': epilog, 'formatter_class': form}
+    parser: argparse.ArgumentParser = commands.add_parser(name, **shown)
+    parser.set_defaults(examples=of_user)
+    return parser
 
 
 Settings = dict[str, Any]  # Of an option, as of `argparse`.
@@ -198,7 +199,7 @@ def workers_of(arguments: argparse.Namespace) -> 'Workers':
 def check_only_for(arguments: argparse.Namespace, options: Iterable[str], what: str) -> None:
     """Check that options are not given, since what they are for is not; ValueError if one is."""
     for name in options:
-        if getattr(arguments, name) not in (None, False, ''):
+        if getattr(arguments, name):
             raise ValueError(f'--{name.replace("_", "-")} is only for {what}')
 
 

@@ -87,8 +87,7 @@ def _kinds(arguments: argparse.Namespace) -> dict[str, Any]:
 
     error, names = arguments.largest_kind_error, [name for name, _ in arguments.kinds or ()]
     if not names:
-        if error is not None:
-            raise ValueError('--largest-kind-error is for several kinds of seals: give them with --seal-kind')
+        cli.check_only_for(arguments, ['largest_kind_error'], 'several kinds of seals: give them with --seal-kind')
         return {'kinds': ()}
     given = [option for field, option in NOT_FOR_KINDS.items() if getattr(arguments, field)]
     if given:

@@ -6,6 +6,9 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import reduce
+from itertools import takewhile
+from operator import or_
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation.configuration import Configuration
@@ -279,13 +282,8 @@ class Bits(NamedTuple):
 
 def recent_bits(rows: Iterable[Row], until: float) -> Bits:
     """Bits of the rows of the last `RECENT` seconds before ``until`` [s]; ``rows`` from the newest on."""
-    status = limited = 0
-    for one in rows:
-        if one[0] <= until - RECENT:
-            break
-        status |= one[-2]
-        limited |= one[-1]
-    return Bits(status, limited)
+    recent = list(takewhile(lambda one: one[0] > until - RECENT, rows))
+    return Bits(*(reduce(or_, (one[place] for one in recent), 0) for place in (-2, -1)))
 
 
 class Presence(NamedTuple):

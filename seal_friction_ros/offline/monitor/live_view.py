@@ -110,7 +110,7 @@ class LiveView:
             label = label if label in found else next(iter(found))
             shown, actuator = found[label]
             every = {name: self._situation(view, key) for name, (view, key) in found.items()}
-            rows = newer(self._rows.get((shown.node, actuator), ()), since)
+            rows = [one for one in self._rows.get((shown.node, actuator), ()) if one[0] > since]
             diagnostics = [{'part': part, **status} for part, status in shown.diagnostics.items()]
         time, more = (self._now - self._start) * 1e-9, {'nodes': unread, 'off': off, 'diagnostics': diagnostics}
         return actuator_view.frame(label, time, rows, every, node=shown.node, **more)
@@ -159,13 +159,3 @@ class LiveView:
         with self._lock:
             self._latch.lift()
         return [Answer(True, 'OFF is lifted: every scale stays as it is until somebody sets it')]
-
-
-def newer(rows: Any, since: float) -> list[Row]:
-    """Rows after a time [s], in order."""
-    found: list[Row] = []
-    for one in reversed(rows):
-        if one[0] <= since:
-            break
-        found.append(one)
-    return found[::-1]

@@ -95,11 +95,7 @@ class NodeView:
         return max(every, default=actuator_view.NOTHING_SAID, key=lambda one: one.level)
 
     def configure(self, text: str) -> None:
-        """Take a configuration, the first one or a changed one.
-
-        Raises:
-            ValueError: It is not valid.
-        """
+        """Take a configuration, the first one or a changed one; ValueError if it is not valid."""
         snapshot = parse_machine_text(text)
         self.known = {name: actuator_view.known_of(one) for name, one in snapshot.configurations.items()}
         self._had_placeholder |= {name for name, one in self.known.items() if one.has_placeholder}

@@ -106,13 +106,8 @@ def _as_row(values: 'array[float]') -> Row:
 class RecordedView:
     """A bag, sampled at the pace of the live view: to its first estimate at once, the rest by `read` or `load`.
 
-    Args:
-        bag: The bag.
-        mapping: Of its machine, if the bag does not hold it; then the estimates are made here.
-
-    Raises:
-        BagError: The bag cannot be read, or has no estimates.
-        ValueError: The mapping does not fit the bag.
+    With a ``mapping`` the estimates are made here. BagError: the bag cannot be read, or has no estimates; ValueError:
+    the mapping does not fit the bag.
     """
 
     def __init__(self, bag: Path, mapping: MappingFile | None = None) -> None:

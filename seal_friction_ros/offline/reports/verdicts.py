@@ -22,15 +22,10 @@ REMARKS = {
 
 
 def of_identification(law: str, error: float, largest: float, coverage: float, unsound: str, *remarks: str) -> Verdict:
-    """Verdict on an identified law.
+    """Verdict on an identified law, by readings left out of its fit.
 
-    Args:
-        law: Its name.
-        error: Mean error of single readings left out [-].
-        largest: Largest error of the mean at a pressure left out [-].
-        coverage: Share of the readings left out that are in the 95 % band [-].
-        unsound: Why the parameters are not determined; empty if they are.
-        remarks: Of `REMARKS`.
+    Their mean ``error`` [-], the ``largest`` of the mean at a pressure [-], their share in the 95 % band [-]; why the
+    parameters are not determined, empty if they are; some of `REMARKS`.
     """
     told = LOOK if remarks else GOOD
     level = worst([between(error, SMALL_ERROR, LARGE_ERROR), in_band(coverage), BAD if unsound else GOOD, told])
@@ -70,12 +65,7 @@ def of_tuning(summary: str, *, is_better: bool, has_placeholder: bool, mass: flo
 
 
 def of_runs(changes: Sequence[tuple[str, float, float]], names: tuple[str, str]) -> Verdict:
-    """Verdict on two runs or seals.
-
-    Args:
-        changes: Name of a quantity, its relative change [-], and the change that is noise [-].
-        names: Of both.
-    """
+    """Verdict on two runs or seals: each quantity with its relative change [-] and the change that is noise [-]."""
     if not changes:
         return Verdict(
             LOOK, f'{names[0]} and {names[1]} have no pressure in common to compare at.', 'record the same pressures.'
