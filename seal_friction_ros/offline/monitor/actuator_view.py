@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 from seal_friction_ros.core.estimation.configuration import Configuration
 from seal_friction_ros.core.estimation.findings import BAD, LOOK, PLACEHOLDER, STATUS_WORDS, USUAL, Finding, deciding
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
+from seal_friction_ros.core.foundation.units import BAR, UM
 from seal_friction_ros.core.friction.force_sum_correction import NO_CORRECTION, ForceSumCorrection, corrected_force_sum
 from seal_friction_ros.core.friction.mounting import CHAMBERS, pressure_at_seal
 from seal_friction_ros.core.friction.states import FrictionState
@@ -31,8 +32,6 @@ from seal_friction_ros.core.messages.records import (
     Velocity,
 )
 
-BAR = 1e5  # [Pa]
-MICROMETRE = 1e-6  # [m]
 OFF = 'off'  # mode of the adaptation
 PAIRED = 0.03  # [s] our choice, as reference_timeout: longest time between the stamps of a reference and a position
 RECENT = 0.5  # [s] our choice: a lamp stays lit for this time
@@ -131,19 +130,19 @@ NOTHING_HELD = Held()
 def known_of(configuration: Configuration) -> Known:
     """What a view needs of a configuration."""
     estimator, feedforward = configuration.parameters()
-    selection = configuration.selection
+    places = zip(configuration.selection.seals, configuration.selection.seal_chambers, strict=True)
     seals = [mounted.seal for mounted in estimator.seals]
     return Known(
-        tuple(f'{name}@{chamber}' for name, chamber in zip(selection.seals, selection.seal_chambers, strict=True)),
-        feedforward.scale,
-        feedforward.lead_time,
-        feedforward.force_limit,
-        max(seal.pressure_min for seal in seals),
-        min(seal.pressure_max for seal in seals),
-        configuration.adaptation.mode,
-        estimator.force_sum_correction,
-        configuration.has_placeholder,
-        tuple(mounted.chamber for mounted in estimator.seals),
+        seals=tuple(f'{name}@{chamber}' for name, chamber in places),
+        scale=feedforward.scale,
+        lead_time=feedforward.lead_time,
+        force_limit=feedforward.force_limit,
+        pressure_low=max(seal.pressure_min for seal in seals),
+        pressure_high=min(seal.pressure_max for seal in seals),
+        adaptation=configuration.adaptation.mode,
+        correction=estimator.force_sum_correction,
+        has_placeholder=configuration.has_placeholder,
+        chambers=tuple(mounted.chamber for mounted in estimator.seals),
     )
 
 
@@ -211,7 +210,7 @@ def tracking_error(held: Held) -> float | None:
     if not abs(apart) <= PAIRED:
         return None
     velocity = reference.velocity if math.isfinite(reference.velocity) else 0.0
-    return float(reference.position + velocity * apart - position.position) / MICROMETRE
+    return float(reference.position + velocity * apart - position.position) / UM
 
 
 def sample_of(known: Known, held: Held) -> tuple[float, ...]:
@@ -283,7 +282,8 @@ class Bits(NamedTuple):
 def recent_bits(rows: Iterable[Row], until: float) -> Bits:
     """Bits of the rows of the last `RECENT` seconds before ``until`` [s]; ``rows`` from the newest on."""
     recent = list(takewhile(lambda one: one[0] > until - RECENT, rows))
-    return Bits(*(reduce(or_, (one[place] for one in recent), 0) for place in (-2, -1)))
+    status, limited = (reduce(or_, (one[place] for one in recent), 0) for place in (-2, -1))
+    return Bits(status, limited)
 
 
 class Presence(NamedTuple):

@@ -16,7 +16,7 @@ from seal_friction_ros.offline.replay.health_indicators import NOT_TOLD, UNKNOWN
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import FIRST_DATE, date_text
-from seal_friction_ros.offline.reports.page import ReportSummary, head_of, script, write_page
+from seal_friction_ros.offline.reports.page import ReportSummary, head_of, write_page
 from seal_friction_ros.offline.work.outcome import Outcome
 from seal_friction_ros.offline.work.places import Place
 
@@ -152,7 +152,6 @@ def write_fleet_report(bags: Sequence[FleetBag], where: Path, out: Path) -> Repo
         rows=_rows(bags, out),
         rigs=rigs,
         text=_text,
-        sorting=script('sorting.js'),
     )
     return ReportSummary(out, figures, numbers)
 

@@ -61,8 +61,6 @@ def write_identification_report(
         warnings=found.warnings,
         worst=worst_left_out(found.levels),
         found=found,
-        left_out_by=found.data.used.left_out_by,
-        are_samples=found.data.prepared.readings.are_samples,
         has_repeatability=bool(np.isfinite(found.quality.repeatability)),
         thesis_figures=[plot.name for plot in plots if plot.name[3:5] in {'16', '17', '18', '19'}],
         level_table=_level_table(found),

@@ -54,7 +54,10 @@ def _map_table(computed: MapRuns, marked: BoolArray) -> Table:
     """Row for each speed and, at the reference speed, direction; ``marked`` where the mesh changes the friction."""
     frictions = np.array([row.friction for row in computed.rows]).T
     rows = [
-        (number(speed / MM), *(number(one, 3) + ' *' * mark for one, mark in zip(of_speed, marks, strict=True)))
+        (
+            number(speed / MM),
+            *(number(one, 3) + (' *' if mark else '') for one, mark in zip(of_speed, marks, strict=True)),
+        )
         for speed, of_speed, marks in zip(computed.law.speeds, frictions.tolist(), marked.T.tolist(), strict=True)
     ]
     reference = number(computed.law.reference_speed / MM)

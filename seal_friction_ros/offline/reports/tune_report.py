@@ -48,8 +48,6 @@ def write_tuning_page(tuning: SimulatorTuning | BagTuning, out: Path) -> tuple[P
         'head': head_of('tune', source, tuning.task.seals),
         'tuning': tuning,
         'found': found,
-        'was': found.without,
-        'now': found.nominal,
         'parameter_table': _parameter_table(tuning),
         'case_table': _case_table(tuning),
     }
