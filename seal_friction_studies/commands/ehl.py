@@ -28,7 +28,7 @@ def add_commands(steps: Any) -> None:
     )  # fmt: skip
     for step in (run, study):
         add_case(step)
-    cli.add_work(study, has_failures=False)
+    cli.add_shared(study, '--work')
 
 
 def run_case(arguments: argparse.Namespace) -> int:

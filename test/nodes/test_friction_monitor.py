@@ -90,7 +90,7 @@ def test_the_curves_of_a_running_axis_move_and_off_takes_the_force_out(changing:
 @NO_BROWSER
 def test_a_slider_sets_the_parameter_and_shows_the_answer_of_the_node(changing: Monitor):
     with shown(changing.url, 1400) as page:
-        page.wait_for('document.getElementById("field-scale")')
+        page.wait_for('!document.getElementById("settings").hidden')
         for value, word in (('0.4', 'yes'), ('7', 'no')):
             page.value(f'byId("field-scale").value = "{value}"')
             page.value('byId("field-scale").dispatchEvent(new Event("change"))')

@@ -33,12 +33,12 @@ def add_parser(commands: Any) -> None:
     for parser in (info, recover, report):
         parser.add_argument('bag', type=Path)
     cli.add_mapping(info)
-    cli.add_bags(replay)
+    cli.add_shared(replay, 'bags')
     cli.add_workers(replay, 'bags, or stretches of one bag,')
-    cli.add_work(replay)
+    cli.add_shared(replay, '--work', '--retry-failed')
     cli.add_configuration(replay)
     cli.add_target(replay, '--out', BAG, metavar='BAG', help='write inputs and new estimates to this bag')
-    cli.add_namespace(replay)
+    cli.add_shared(replay, '--namespace')
     replay.add_argument('--verify', action='store_true', help='compare with the recorded estimates byte for byte')
     cli.add_options(compare, _OF_COMPARE)
     cli.add_actuator(compare)
@@ -110,9 +110,8 @@ def run_compare(arguments: argparse.Namespace) -> int:
     if arguments.out:
         from seal_friction_ros.offline.reports.comparison_report import write_comparison
 
-        for option in ('topic', 'atol', 'rtol', 'fields'):
-            if getattr(arguments, option):
-                raise ValueError(f'--{option} is for messages of equal stamp: leave it out, or leave out --out')
+        options = ('topic', 'atol', 'rtol', 'fields')
+        cli.check_only_for(arguments, options, 'messages of equal stamp: leave it out, or leave out --out')
         mapping = cli.mapping_of(arguments)
         report = write_comparison(arguments.a, arguments.b, arguments.out, arguments.namespace, mapping)
         return cli.print_result(arguments, report, f'{report.numbers["level"]}: {report.numbers["verdict"]}')

@@ -69,8 +69,7 @@ class Parser(argparse.ArgumentParser):
 
 def add_group(commands: Any, name: str, metavar: str, description: str, *examples: str) -> Any:
     """Add a command that has kinds, each with a parser of its own; returns the subparsers for them."""
-    parser = commands.add_parser(name, **_help(description, examples))
-    parser.set_defaults(examples=[f'seal_friction {example}' for example in examples])
+    parser = _new_parser(commands, name, description, examples)
     return parser.add_subparsers(title=f'{metavar.lower()}s', required=True, metavar=metavar)
 
 
@@ -87,18 +86,20 @@ def add_command(
     The ``examples`` are command lines for ``--help``, without ``seal_friction``. The command does not work without the
     optional packages that it ``needs``, though it could be imported.
     """
-    parser: argparse.ArgumentParser = commands.add_parser(name, **_help(description, examples))
+    parser = _new_parser(commands, name, description, examples)
     parser.add_argument('--json', action='store_true', help='print the numbers as one JSON object on stdout')
-    of_user = [f'seal_friction {example}' for example in examples]
-    parser.set_defaults(run=run, command=parser.prog.split()[1], targets={}, needs=needs, examples=of_user)
+    parser.set_defaults(run=run, command=parser.prog.split()[1], targets={}, needs=needs)
     return parser
 
 
-def _help(description: str, examples: Sequence[str]) -> dict[str, Any]:
-    """Description and examples for ``--help``."""
-    lines = ['examples:' if examples[1:] else 'example:', *(f'  seal_friction {example}' for example in examples)]
-    shown = {'help': description, 'description': description, 'epilog': '\n'.join(lines)}
-    return {**shown, 'formatter_class': argparse.RawDescriptionHelpFormatter}
+def _new_parser(commands: Any, name: str, description: str, examples: Sequence[str]) -> argparse.ArgumentParser:
+    of_user = [f'seal_friction {example}' for example in examples]
+    epilog = '\n  '.join(['examples:' if examples[1:] else 'example:', *of_user])
+    form: Any = argparse.RawDescriptionHelpFormatter
+    shown = {'help': description, 'description': description, 'epilog': epilog, 'formatter_class': form}
+    parser: argparse.ArgumentParser = commands.add_parser(name, **shown)
+    parser.set_defaults(examples=of_user)
+    return parser
 
 
 Settings = dict[str, Any]  # Of an option, as of `argparse`.
@@ -142,26 +143,20 @@ def add_page(parser: argparse.ArgumentParser, option: str = '--out', *, required
     add_target(parser, option, PAGE, required=required, metavar='FILE.html', help=text)
 
 
+def add_shared(parser: Any, *names: str) -> None:
+    """Add options that several commands have."""
+    add_options(parser, {name: _SHARED[name] for name in names})
+
+
 def add_actuator(parser: Any) -> None:
     """Add the options that restrict a bag to one actuator, and for bags that tell nothing of their machine."""
-    add_namespace(parser)
+    add_shared(parser, '--namespace')
     add_mapping(parser)
-
-
-def add_namespace(parser: Any) -> None:
-    """Add the option that restricts a bag to one actuator."""
-    text = 'use only topics below it; of a machine the name of an actuator'
-    parser.add_argument('--namespace', default='', help=text)
 
 
 def add_mapping(parser: Any) -> None:
     """Add the option for bags that tell nothing of their machine."""
     add_file(parser, '--mapping', 'machines', 'mapping file of the machine, for a bag without configuration')
-
-
-def add_bags(parser: Any) -> None:
-    """Add the argument for several bags."""
-    parser.add_argument('bags', type=place, nargs='+', metavar='BAG', help='path, or URL of fsspec')
 
 
 def mapping_of(arguments: argparse.Namespace) -> 'MappingFile | None':
@@ -173,7 +168,7 @@ def mapping_of(arguments: argparse.Namespace) -> 'MappingFile | None':
 
 def add_configuration(parser: argparse.ArgumentParser) -> None:
     """Add the options that replace the configuration of a bag or the default one."""
-    parser.add_argument('--params', type=Path, metavar='FILE', help='ROS parameter file of the estimator')
+    add_shared(parser, '--params')
     add_file(parser, '--seal', 'seals', 'seal file for every seal', metavar='SEAL')
 
 
@@ -201,26 +196,10 @@ def workers_of(arguments: argparse.Namespace) -> 'Workers':
     return arguments.workers or available_cores()
 
 
-def add_work(parser: argparse.ArgumentParser, *, has_failures: bool = True) -> None:
-    """Add the option for the folder of finished parts, and for those that failed if they are kept, too."""
-    options: dict[str, tuple[str, Settings]] = {
-        '--work': ('keep finished parts in this folder, and resume from them', {'type': Path, 'metavar': 'FOLDER'}),
-        '--retry-failed': ('with --work: try again what failed before', {'action': 'store_true'}),
-    }
-    add_options(parser, options if has_failures else {'--work': options['--work']})
-
-
-def add_uncertainty(parser: argparse.ArgumentParser) -> None:
-    """Add the options for samples of what is not known."""
-    help_text = 'quantiles from so many samples of what the case says is unknown'
-    parser.add_argument('--uncertain', type=at_least(2), metavar='N', help=help_text)
-    parser.add_argument('--seed', type=at_least(0), metavar='S', help='with --uncertain: of the samples; default: 0')
-
-
 def check_only_for(arguments: argparse.Namespace, options: Iterable[str], what: str) -> None:
     """Check that options are not given, since what they are for is not; ValueError if one is."""
     for name in options:
-        if getattr(arguments, name) not in (None, False, ''):
+        if getattr(arguments, name):
             raise ValueError(f'--{name.replace("_", "-")} is only for {what}')
 
 
@@ -328,6 +307,18 @@ def at_least(least: int) -> Callable[[str], int]:
         return int(text)
 
     return whole_number
+
+
+_SAMPLES = 'quantiles from so many samples of what the case says is unknown'
+_SHARED: dict[str, tuple[str, Settings]] = {
+    'bags': ('path, or URL of fsspec', {'type': place, 'nargs': '+', 'metavar': 'BAG'}),
+    '--namespace': ('use only topics below it; of a machine the name of an actuator', {'default': ''}),
+    '--params': ('ROS parameter file of the estimator', {'type': Path, 'metavar': 'FILE'}),
+    '--work': ('keep finished parts in this folder, and resume from them', {'type': Path, 'metavar': 'FOLDER'}),
+    '--retry-failed': ('with --work: try again what failed before', {'action': 'store_true'}),
+    '--uncertain': (_SAMPLES, {'type': at_least(2), 'metavar': 'N'}),
+    '--seed': ('with --uncertain: of the samples; default: 0', {'type': at_least(0), 'metavar': 'S'}),
+}
 
 
 # -- output -----------------------------------------------------------------------------------------------------------

@@ -13,10 +13,9 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Look and print; exit code 1 if a node cannot run or would not be discovered."""
-    from seal_friction_ros.offline.work.computer import Level, findings
+    from seal_friction_ros.offline.work.computer import FAULT, findings
 
     found = findings()
-    numbers = [{'level': one.level.value, 'subject': one.subject, 'text': one.text} for one in found]
-    lines = [f'{one.level.value:<5} {one.subject}: {one.text}' for one in found]
-    code = cli.DIFFERENT if any(one.level is Level.FAULT for one in found) else cli.SUCCESS
-    return cli.print_result(arguments, {'findings': numbers}, '\n'.join(lines), code)
+    lines = [f'{level:<5} {subject}: {text}' for level, subject, text in found]
+    code = cli.DIFFERENT if any(one.level == FAULT for one in found) else cli.SUCCESS
+    return cli.print_result(arguments, {'findings': found}, '\n'.join(lines), code)

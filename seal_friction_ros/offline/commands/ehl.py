@@ -27,9 +27,9 @@ def add_parser(commands: Any) -> None:
         needs=('numba',),
     )  # fmt: skip
     cli.add_target(chart, '--seal-file', SEAL_FILE, metavar='FILE.yaml', help='seal file to write')
-    cli.add_uncertainty(chart)
+    cli.add_shared(chart, '--uncertain', '--seed')
     add_case(chart)
-    cli.add_work(chart, has_failures=False)
+    cli.add_shared(chart, '--work')
 
 
 def add_case(step: argparse.ArgumentParser) -> None:
@@ -53,11 +53,10 @@ def run_map(arguments: argparse.Namespace) -> int:
 
         uncertainty = uncertain_map(case, *samples, workers, arguments.work)
     computed = runs.run_map(case, workers, arguments.work)._replace(uncertainty=uncertainty)
-    numbers, summary = _with_page(arguments, computed, lambda page: write_map_page(computed, page))
     if arguments.seal_file is not None:
         document = runs.seal_document(computed, arguments.seal_file.stem)
         write_seal(document, arguments.seal_file, f'Seal file, {mark("ehl")} map.')
-    return cli.print_result(arguments, numbers, summary)
+    return print_with_page(arguments, computed, lambda page: write_map_page(computed, page))
 
 
 def _case(name: str) -> 'LubricationCase':
@@ -72,15 +71,7 @@ def _case(name: str) -> 'LubricationCase':
 
 def print_with_page(arguments: argparse.Namespace, result: Any, write_page: Callable[[Path], Iterable[Path]]) -> int:
     """Write the page, if one is asked for, and print the result."""
-    return cli.print_result(arguments, *_with_page(arguments, result, write_page))
-
-
-def _with_page(
-    arguments: argparse.Namespace, result: Any, write_page: Callable[[Path], Iterable[Path]]
-) -> tuple[dict[str, Any], str]:
-    """Numbers and summary of a result, with the page, if one is asked for."""
-    numbers, summary = result.numbers(), result.summary()
-    if arguments.out is None:
-        return numbers, summary
-    figures = tuple(write_page(arguments.out))
-    return {**numbers, 'page': arguments.out, 'figures': figures}, summary
+    numbers = result.numbers()
+    if arguments.out is not None:
+        numbers |= {'page': arguments.out, 'figures': tuple(write_page(arguments.out))}
+    return cli.print_result(arguments, numbers, result.summary())

@@ -20,7 +20,7 @@ def add_parser(commands: Any) -> None:
     description = 'learn the friction of today from bags and save it as a seal file'
     example = 'adapt today --seal my_seal.yaml --out my_seal_today.yaml'
     adapt = cli.add_command(commands, 'adapt', run_adapt, description, example)
-    cli.add_bags(health)
+    cli.add_shared(health, 'bags')
     help_text = 'folder with bags below it, or text file with the path or URL of a bag in each line'
     fleet.add_argument('where', type=Path, metavar='DIR|LIST', help=help_text)
     help_text = 'table with a row for each bag and pressure level'
@@ -30,11 +30,11 @@ def add_parser(commands: Any) -> None:
         cli.add_actuator(parser)
         cli.add_page(parser, required=parser is fleet)
         cli.add_workers(parser, 'bags')
-        cli.add_work(parser)
+        cli.add_shared(parser, '--work', '--retry-failed')
     cli.add_options(health, _LIMITS)
     adapt.add_argument('bags', type=Path, nargs='+', metavar='BAG')
     cli.add_file(adapt, '--seal', 'seals', 'seal file to begin with', required=True, metavar='SEAL')
-    cli.add_namespace(adapt)
+    cli.add_shared(adapt, '--namespace')
     cli.add_target(adapt, '--out', SEAL_FILE, metavar='FILE', required=True, help='seal file to write')
 
 

@@ -33,7 +33,7 @@ def add_parser(commands: Any) -> None:
     cli.add_options(parser, _WHAT_IS_KNOWN)
     cli.add_actuator(parser)
     cli.add_workers(parser, 'sources, and groups of readings that are left out,')
-    cli.add_work(parser, has_failures=False)
+    cli.add_shared(parser, '--work')
 
 
 def _chambers(text: str) -> tuple[str, ...]:
@@ -87,8 +87,7 @@ def _kinds(arguments: argparse.Namespace) -> dict[str, Any]:
 
     error, names = arguments.largest_kind_error, [name for name, _ in arguments.kinds or ()]
     if not names:
-        if error is not None:
-            raise ValueError('--largest-kind-error is for several kinds of seals: give them with --seal-kind')
+        cli.check_only_for(arguments, ['largest_kind_error'], 'several kinds of seals: give them with --seal-kind')
         return {'kinds': ()}
     given = [option for field, option in NOT_FOR_KINDS.items() if getattr(arguments, field)]
     if given:
@@ -145,8 +144,8 @@ def run(arguments: argparse.Namespace) -> int:
 def _next(arguments: argparse.Namespace, found: 'Identification') -> tuple[dict[str, Any], dict[str, Any], list[str]]:
     """Write the sheet of ``--next``: its paths and numbers for JSON, and lines for a person."""
     from seal_friction_ros.offline.identification import next_readings
-    from seal_friction_ros.offline.identification.data_sheet import write_new_csv, write_sheet
-    from seal_friction_ros.offline.reports.data_sheet_page import write_data_sheet_page
+    from seal_friction_ros.offline.identification.data_sheet import DIMENSIONS, write_new_csv, write_sheet
+    from seal_friction_ros.offline.reports.page import write_page
 
     if not arguments.next:
         return {}, {}, []
@@ -156,6 +155,6 @@ def _next(arguments: argparse.Namespace, found: 'Identification') -> tuple[dict[
     design = next_readings.design_for(found)
     plan, page = next_readings.plan_of(found, design), arguments.next.with_suffix('.html')
     write_sheet(plan, arguments.next)
-    write_data_sheet_page(plan, page, 'identify')
+    write_page(page, 'data_sheet', (), plan=plan, dimensions=DIMENSIONS, command='identify')
     texts = [f'next: {line}' for line in next_readings.texts_of(found, design)]
     return {'sheet': arguments.next, 'sheet_page': page}, next_readings.numbers_of(design), texts

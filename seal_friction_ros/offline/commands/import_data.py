@@ -42,7 +42,7 @@ def add_parser(commands: Any) -> None:
         help_text = f'bag to make; of several {what} a folder with a bag each, by their names'
         cli.add_target(source, '--out', BAG, required=True, metavar='BAG', help=help_text)
         cli.add_workers(source, what)
-        cli.add_work(source)
+        cli.add_shared(source, '--work', '--retry-failed')
 
 
 def run_log(arguments: argparse.Namespace) -> int:

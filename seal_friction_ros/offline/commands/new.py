@@ -1,6 +1,7 @@
 """``seal_friction new``: write a file of a kind."""
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -39,32 +40,30 @@ def add_parser(commands: Any) -> None:
 def run_robot(arguments: argparse.Namespace) -> int:
     """Write a mapping file from a bag, or from topics."""
     from seal_friction_ros.offline.bags.new_machine import new_machine, recorded_topics
-    from seal_friction_ros.offline.work.atomic_file import write_whole
 
     if arguments.from_bag:
         text = new_machine(arguments.from_bag)
     else:
         with recorded_topics(arguments.from_topics, arguments.wait) as bag:
             text = new_machine(bag)
-    write_whole(arguments.out, text.encode())
-    return _say_open(arguments, text, {'actuators': _actuators(arguments.out)})
+    return _written(arguments, text, lambda: {'actuators': _actuators(arguments.out)})
 
 
 def run_rig(arguments: argparse.Namespace) -> int:
     """Write a rig file from the head of a log."""
     from seal_friction_ros.offline.bags.new_rig import new_rig
+
+    return _written(arguments, new_rig(arguments.log), dict)
+
+
+def _written(arguments: argparse.Namespace, text: str, numbers: Callable[[], dict[str, Any]]) -> int:
+    """Write a new file, and say which of its points are open; ``numbers`` are of the file."""
     from seal_friction_ros.offline.work.atomic_file import write_whole
 
-    text = new_rig(arguments.log)
     write_whole(arguments.out, text.encode())
-    return _say_open(arguments, text, {})
-
-
-def _say_open(arguments: argparse.Namespace, text: str, numbers: dict[str, Any]) -> int:
-    """Say which points of a new file are open."""
     open_points = [line.strip() for line in text.splitlines()[2:] if 'missing' in line or 'guess' in line]
     summary = '\n'.join([f'{len(open_points)} points are open:', *open_points])
-    return cli.print_result(arguments, {'file': arguments.out, 'open': open_points, **numbers}, summary)
+    return cli.print_result(arguments, {'file': arguments.out, 'open': open_points, **numbers()}, summary)
 
 
 def run_policy(arguments: argparse.Namespace) -> int:

@@ -27,9 +27,9 @@ def add_parser(commands: Any) -> None:
     cli.add_file(parser, '--law-from', 'seals', help_text, metavar='SEAL')
     cli.add_target(parser, '--out', SEAL_FILE, metavar='SEAL.yaml', help='seal file to write')
     cli.add_page(parser, '--report', required=False)
-    cli.add_uncertainty(parser)
+    cli.add_shared(parser, '--uncertain', '--seed')
     cli.add_workers(parser, 'samples')
-    cli.add_work(parser, has_failures=False)
+    cli.add_shared(parser, '--work')
 
 
 def run(arguments: argparse.Namespace) -> int:

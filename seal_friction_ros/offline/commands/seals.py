@@ -82,7 +82,7 @@ def run_force(arguments: argparse.Namespace) -> int:
 def run_sheet(arguments: argparse.Namespace) -> int:
     """Write the sheet."""
     from seal_friction_ros.offline.identification import data_sheet
-    from seal_friction_ros.offline.reports.data_sheet_page import write_data_sheet_page
+    from seal_friction_ros.offline.reports.page import write_page
 
     geometry = data_sheet.geometry_of_seal_file(arguments.seal)[0] if arguments.seal else None
     low, high, steps = arguments.pressures
@@ -90,7 +90,7 @@ def run_sheet(arguments: argparse.Namespace) -> int:
     plan = data_sheet.FrictionTestPlan(arguments.name, low, high, steps, geometry=geometry, **given)
     sheet, page = arguments.out, arguments.out.with_suffix('.html')
     data_sheet.write_sheet(plan, sheet)
-    write_data_sheet_page(plan, page)
+    write_page(page, 'data_sheet', (), plan=plan, dimensions=data_sheet.DIMENSIONS, command='sheet')
     return cli.print_result(arguments, {'sheet': sheet, 'page': page}, '')
 
 

@@ -6,16 +6,16 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import reduce
+from itertools import takewhile
+from operator import or_
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation.configuration import Configuration
 from seal_friction_ros.core.estimation.findings import BAD, LOOK, PLACEHOLDER, STATUS_WORDS, USUAL, Finding, deciding
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
-from seal_friction_ros.core.friction.force_sum_correction import (
-    NO_CORRECTION,
-    ForceSumCorrection,
-    corrected_force_sum,
-)
+from seal_friction_ros.core.foundation.units import BAR, UM
+from seal_friction_ros.core.friction.force_sum_correction import NO_CORRECTION, ForceSumCorrection, corrected_force_sum
 from seal_friction_ros.core.friction.mounting import CHAMBERS, pressure_at_seal
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.messages.records import (
@@ -32,8 +32,6 @@ from seal_friction_ros.core.messages.records import (
     Velocity,
 )
 
-BAR = 1e5  # [Pa]
-MICROMETRE = 1e-6  # [m]
 OFF = 'off'  # mode of the adaptation
 PAIRED = 0.03  # [s] our choice, as reference_timeout: longest time between the stamps of a reference and a position
 RECENT = 0.5  # [s] our choice: a lamp stays lit for this time
@@ -132,19 +130,19 @@ NOTHING_HELD = Held()
 def known_of(configuration: Configuration) -> Known:
     """What a view needs of a configuration."""
     estimator, feedforward = configuration.parameters()
-    selection = configuration.selection
+    places = zip(configuration.selection.seals, configuration.selection.seal_chambers, strict=True)
     seals = [mounted.seal for mounted in estimator.seals]
     return Known(
-        tuple(f'{name}@{chamber}' for name, chamber in zip(selection.seals, selection.seal_chambers, strict=True)),
-        feedforward.scale,
-        feedforward.lead_time,
-        feedforward.force_limit,
-        max(seal.pressure_min for seal in seals),
-        min(seal.pressure_max for seal in seals),
-        configuration.adaptation.mode,
-        estimator.force_sum_correction,
-        configuration.has_placeholder,
-        tuple(mounted.chamber for mounted in estimator.seals),
+        seals=tuple(f'{name}@{chamber}' for name, chamber in places),
+        scale=feedforward.scale,
+        lead_time=feedforward.lead_time,
+        force_limit=feedforward.force_limit,
+        pressure_low=max(seal.pressure_min for seal in seals),
+        pressure_high=min(seal.pressure_max for seal in seals),
+        adaptation=configuration.adaptation.mode,
+        correction=estimator.force_sum_correction,
+        has_placeholder=configuration.has_placeholder,
+        chambers=tuple(mounted.chamber for mounted in estimator.seals),
     )
 
 
@@ -166,22 +164,16 @@ def next_interval(held: Held) -> Held:
 
 
 def row(known: Known, held: Held, time: float, since: int = -1) -> Row:
-    """Numbers of one moment.
+    """Numbers of one moment, at a time [s] on the axis of the view.
 
     The band is that of the next reading while the rod slides: friction force plus and minus `BAND_95` standard
-    deviations.
-
-    Args:
-        known: Configuration of the actuator.
-        held: Newest records.
-        time: [s] on the axis of the view.
-        since: [ns] of the row before: what was received until then is in no row again.
+    deviations. What was received until the row before, ``since`` [ns], is in no row again.
     """
     estimate = held.estimate
     new = {kind: record for kind, record in held.records.items() if held.receipts[kind] > since}
     pressure, feedforward = new.get(Pressure), new.get(FeedForward)
     source, measured = measured_friction(known, held)
-    friction = low = high = scale = spread = residual = None
+    friction = low = high = scale = spread = residual = math.nan
     if FrictionEstimate in new and estimate.stamp != NEVER:
         friction = estimate.friction_force
         if estimate.state == FrictionState.SLIDING:
@@ -190,23 +182,12 @@ def row(known: Known, held: Held, time: float, since: int = -1) -> Row:
         if known.adaptation != OFF:
             scale, residual = estimate.adaptation_scale, estimate.residual
             spread = BAND_95 * estimate.adaptation_scale_std
-    values = (
-        measured if source in new else None,
-        friction,
-        low,
-        high,
-        None if feedforward is None else feedforward.force,
-        None if feedforward is None else known.force_limit,
-        None if feedforward is None else -known.force_limit,
-        tracking_error(held) if Position in new else None,
-        None if pressure is None else pressure.chamber_a / BAR,
-        None if pressure is None else pressure.chamber_b / BAR,
-        scale,
-        None if scale is None or spread is None else scale - spread,
-        None if scale is None or spread is None else scale + spread,
-        residual,
-    )
-    return (round(time, 3), *(finite(value) for value in values), held.status, held.limited)
+    forces = (feedforward.force, known.force_limit, -known.force_limit) if feedforward else (None, None, None)
+    error = tracking_error(held) if Position in new else None
+    pressures = (pressure.chamber_a / BAR, pressure.chamber_b / BAR) if pressure else (None, None)
+    learnt = (scale, scale - spread, scale + spread, residual)
+    values = (measured if source in new else None, friction, low, high, *forces, error, *pressures, *learnt)
+    return (round(time, 3), *map(finite, values), held.status, held.limited)
 
 
 def finite(value: float | None, digits: int = 6) -> float | None:
@@ -229,7 +210,7 @@ def tracking_error(held: Held) -> float | None:
     if not abs(apart) <= PAIRED:
         return None
     velocity = reference.velocity if math.isfinite(reference.velocity) else 0.0
-    return float(reference.position + velocity * apart - position.position) / MICROMETRE
+    return float(reference.position + velocity * apart - position.position) / UM
 
 
 def sample_of(known: Known, held: Held) -> tuple[float, ...]:
@@ -255,9 +236,7 @@ def tracked_of(held: Held) -> tuple[float, ...]:
 
 
 def measured_friction(known: Known, held: Held) -> tuple[type, float | None]:
-    """Friction [N] that the measurements show: the force sum, which is the friction while the speed is even.
-
-    With it the record that it is of.
+    """Friction [N] that the measurements show: the force sum, which is the friction at even speed; and its record.
 
     Once adaptation has learnt a scale, inertia and offset are known while the rod slides: the friction is estimate plus
     residual. Before, the offset would hide what the law misses.
@@ -302,12 +281,8 @@ class Bits(NamedTuple):
 
 def recent_bits(rows: Iterable[Row], until: float) -> Bits:
     """Bits of the rows of the last `RECENT` seconds before ``until`` [s]; ``rows`` from the newest on."""
-    status = limited = 0
-    for one in rows:
-        if one[0] <= until - RECENT:
-            break
-        status |= one[-2]
-        limited |= one[-1]
+    recent = list(takewhile(lambda one: one[0] > until - RECENT, rows))
+    status, limited = (reduce(or_, (one[place] for one in recent), 0) for place in (-2, -1))
     return Bits(status, limited)
 
 
@@ -335,16 +310,10 @@ def situation(
     presence: Presence | None = None,
     findings: Sequence[Finding] = (),
 ) -> dict[str, Any]:
-    """The situation in words and numbers, ready for JSON.
+    """The situation in words and numbers at ``now`` [ns] on the clock of receipt, ready for JSON.
 
-    Args:
-        known: Configuration of the actuator.
-        held: Newest records.
-        bits: Of the last answers.
-        now: [ns] on the clock of receipt.
-        said: What the diagnostics of the node say of the actuator.
-        presence: Whether the node is there; None: not known, in a bag.
-        findings: On the run so far.
+    ``said`` is what the diagnostics of the node say of the actuator; in a bag nothing is known of its ``presence``;
+    ``findings`` are on the run so far.
     """
     estimate, feedforward = held.estimate, held.records.get(FeedForward)
     cause, why = _cause(held, now, said, presence)
@@ -367,9 +336,7 @@ def situation(
         'breakaway': finite(estimate.breakaway_force),
         'feedforward': None if feedforward is None else finite(feedforward.force),
         'lamps': {bit.name: bool(bits.limited & bit) for bit in Limited},
-        'ages': {
-            name: _age(held, kind, now) for kind, name in INPUT_NAMES.items() if kind in held.records or kind in NEEDED
-        },
+        'ages': {INPUT_NAMES[kind]: _age(held, kind, now) for kind in _listed(held)},
         'answer_age': _age(held, FrictionEstimate, now),
         'feedforward_age': _age(held, FeedForward, now),
         'error_age': _age(held, Position, now),
@@ -381,11 +348,7 @@ def situation(
         'offset': finite(estimate.adaptation_offset),
         'seals': list(known.seals),
         'range': [finite(known.pressure_low / BAR), finite(known.pressure_high / BAR)],
-        'settings': {
-            'scale': finite(known.scale),
-            'lead_time': finite(known.lead_time),
-            'force_limit': finite(known.force_limit),
-        },
+        'settings': {name: finite(getattr(known, name)) for name in ('scale', 'lead_time', 'force_limit')},
     }
 
 
@@ -395,6 +358,17 @@ def frame(
     """What a page gets at a time [s]: rows of the actuator ``label``, and of ``every`` actuator what its tab shows."""
     tabs = [{'label': name} | {key: one[key] for key in ('verdict', 'feedforward')} for name, one in every.items()]
     return {'label': label, 'time': round(time, 3), 'rows': rows, 'now': every[label], 'actuators': tabs, **more}
+
+
+def _listed(held: Held) -> list[type]:
+    """Kinds of inputs that came, and those that have to."""
+    return [kind for kind in INPUT_NAMES if kind in held.records or kind in NEEDED]
+
+
+def _silent(held: Held, now: int) -> dict[str, float | None]:
+    """Name and age [s] of each input that is missing; a temperature may come seldom."""
+    ages = {INPUT_NAMES[kind]: _age(held, kind, now) for kind in _listed(held) if kind is not Temperature}
+    return {name: age for name, age in ages.items() if age is None or age > TOO_OLD}
 
 
 def _faults(status: int) -> list[str]:
@@ -424,9 +398,7 @@ def _cause(held: Held, now: int, said: Said, presence: Presence | None) -> tuple
         return 'node', f'the node is gone or stopped: {how}; what is shown is old'
     if said.message == INACTIVE:
         return 'estimate', f'{since}: the node is inactive'
-    kinds = [kind for kind in INPUT_NAMES if kind in NEEDED or (kind in held.records and kind is not Temperature)]
-    seen = {kind: _age(held, kind, now) for kind in kinds}
-    missing = [INPUT_NAMES[kind] for kind, old in seen.items() if old is None or old > TOO_OLD]
+    missing = _silent(held, now)
     is_heard = presence is None or age is None or (presence.heard - held.receipts[FrictionEstimate]) * 1e-9 > TOO_OLD
     if missing and is_heard:
         there = '' if presence is None else '; the node is there'
@@ -445,10 +417,5 @@ def _present(held: Held, status: int, now: int, said: Said) -> Iterator[Finding]
     if serious:
         more = f', and {len(serious) - 1} more' if serious[1:] else ''
         yield Finding(LOOK, f'now: {serious[0]}{more}', 'see the faults')
-    old = [
-        f'{INPUT_NAMES[kind]} for {age:.1f} s'
-        for kind in INPUT_NAMES
-        if (age := _age(held, kind, now)) is not None and age > TOO_OLD and kind is not Temperature
-    ]
-    if old:
+    if old := [f'{name} for {age:.1f} s' for name, age in _silent(held, now).items() if age is not None]:
         yield Finding(LOOK, f'no {", no ".join(old)}', 'see what publishes it')

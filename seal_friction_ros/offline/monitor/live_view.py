@@ -6,15 +6,8 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from seal_friction_ros.core.estimation.findings import BAD, Finding
-from seal_friction_ros.offline.monitor.actuator_view import (
-    COLUMNS,
-    Row,
-    frame,
-    next_interval,
-    recent_bits,
-    row,
-    situation,
-)
+from seal_friction_ros.offline.monitor import actuator_view
+from seal_friction_ros.offline.monitor.actuator_view import COLUMNS, Row, next_interval, recent_bits
 from seal_friction_ros.offline.monitor.node_view import NodeView
 from seal_friction_ros.offline.monitor.off_latch import Answer, OffLatch, Scale
 
@@ -37,9 +30,8 @@ def no_changes(wanted: Iterable[str]) -> list[Answer]:
 class LiveView:
     """All estimators of a graph. The node that listens writes, the threads of the page read.
 
-    Args:
-        start: [ns] on the clock of receipt, 0 of the time axis.
-        change: Sets parameters; None: read only.
+    The time axis begins at ``start`` [ns] on the clock of receipt. Without ``change``, which sets parameters, it is
+    read only.
     """
 
     def __init__(self, start: int, change: Change | None = None) -> None:
@@ -68,7 +60,7 @@ class LiveView:
             for view in self._nodes.values():
                 for actuator, known in view.known.items():
                     rows = self._rows.setdefault((view.node, actuator), deque(maxlen=round(KEPT * RATE)))
-                    rows.append(row(known, view.held[actuator], time, before))
+                    rows.append(actuator_view.row(known, view.held[actuator], time, before))
                     view.held[actuator] = next_interval(view.held[actuator])
 
     # --- OFF ---
@@ -87,6 +79,9 @@ class LiveView:
     def _scales(self) -> list[Scale]:
         return [one for view in self._nodes.values() for one in view.scales(self._now)]
 
+    def _actuators(self) -> dict[str, tuple[NodeView, str]]:
+        return {view.label(name): (view, name) for view in self._nodes.values() for name in view.known}
+
     def _unread(self) -> dict[str, str]:
         """Nodes whose configuration is not known, and why."""
         return {name: view.refused for name, view in self._nodes.items() if not view.known}
@@ -102,26 +97,23 @@ class LiveView:
         return {**about, 'start': str(self._start), 'period': 1.0 / RATE}
 
     def view(self, label: str, since: float, until: float | None = None) -> dict[str, Any]:
-        """Rows of an actuator after ``since`` [s], and the situation of all.
+        """Rows of an actuator, or of the first one if there is no such, after ``since`` [s], and the situation of all.
 
-        Args:
-            label: Of the actuator; the first one if there is no such.
-            since: Time of the last row that the page has.
-            until: Not used: a live view ends now.
+        A live view ends now, and not at ``until``.
         """
         del until
         with self._lock:
-            found = {view.label(name): (view, name) for view in self._nodes.values() for name in view.known}
+            found = self._actuators()
             off, unread = self._off_document(), self._unread()
             if not found:
                 return {'label': '', 'rows': [], 'actuators': [], 'diagnostics': [], 'nodes': unread, 'off': off}
             label = label if label in found else next(iter(found))
             shown, actuator = found[label]
             every = {name: self._situation(view, key) for name, (view, key) in found.items()}
-            rows = newer(self._rows.get((shown.node, actuator), ()), since)
+            rows = [one for one in self._rows.get((shown.node, actuator), ()) if one[0] > since]
             diagnostics = [{'part': part, **status} for part, status in shown.diagnostics.items()]
         time, more = (self._now - self._start) * 1e-9, {'nodes': unread, 'off': off, 'diagnostics': diagnostics}
-        return frame(label, time, rows, every, node=shown.node, **more)
+        return actuator_view.frame(label, time, rows, every, node=shown.node, **more)
 
     def _situation(self, view: NodeView, actuator: str) -> dict[str, Any]:
         rows, time = self._rows.get((view.node, actuator), ()), (self._now - self._start) * 1e-9
@@ -129,18 +121,15 @@ class LiveView:
         known, held = view.known[actuator], view.held[actuator]
         lost = [text for kind, text in (self._off_document() or {'lines': []})['lines'] if kind == 'no']
         found = [Finding(BAD, text, 'press OFF again, or stop the node') for text in lost] + view.findings(actuator)
-        return situation(known, held, bits, self._now, view.said(actuator), view.presence, found)
+        said, presence = view.said(actuator), view.presence
+        return actuator_view.situation(known, held, bits, self._now, said, presence, found)
 
     def change(self, label: str, parameter: str, value: float) -> list[Answer]:
-        """Set a parameter of the feed-forward of one actuator.
-
-        Raises:
-            ValueError: There is no such actuator or parameter.
-        """
+        """Set a parameter of the feed-forward of one actuator; ValueError: there is no such actuator or parameter."""
         if parameter not in CHANGEABLE:
             raise ValueError(f'parameter {parameter!r}: one of {", ".join(CHANGEABLE)}')
         with self._lock:
-            found = {view.label(name): (view, name) for view in self._nodes.values() for name in view.known}
+            found = self._actuators()
         if label not in found:
             raise ValueError(f'no actuator {label!r}')
         view, actuator = found[label]
@@ -170,13 +159,3 @@ class LiveView:
         with self._lock:
             self._latch.lift()
         return [Answer(True, 'OFF is lifted: every scale stays as it is until somebody sets it')]
-
-
-def newer(rows: Any, since: float) -> list[Row]:
-    """Rows after a time [s], in order."""
-    found: list[Row] = []
-    for one in reversed(rows):
-        if one[0] <= since:
-            break
-        found.append(one)
-    return found[::-1]

@@ -15,18 +15,14 @@ from seal_friction_ros.core.messages.records import NEVER, FrictionEstimate
 from seal_friction_ros.core.messages.together import decode_newest, decode_together
 from seal_friction_ros.offline.bags.bag import BagMessage
 from seal_friction_ros.offline.bags.mapped_bag import Translation
+from seal_friction_ros.offline.monitor import actuator_view
 from seal_friction_ros.offline.monitor.actuator_view import (
     NOTHING_HELD,
-    NOTHING_SAID,
     UNKNOWN_CONFIGURATION,
     Held,
     Known,
     Presence,
     Said,
-    known_of,
-    sample_of,
-    take,
-    tracked_of,
 )
 from seal_friction_ros.offline.monitor.off_latch import Scale
 from seal_friction_ros.offline.replay.run_findings import raised
@@ -96,16 +92,12 @@ class NodeView:
         """Worst of the diagnostics that concern an actuator."""
         parts = (self.part(actuator), 'recorder')
         every = [Said(one['level'], one['message']) for part in parts if (one := self.diagnostics.get(part))]
-        return max(every, default=NOTHING_SAID, key=lambda one: one.level)
+        return max(every, default=actuator_view.NOTHING_SAID, key=lambda one: one.level)
 
     def configure(self, text: str) -> None:
-        """Take a configuration, the first one or a changed one.
-
-        Raises:
-            ValueError: It is not valid.
-        """
+        """Take a configuration, the first one or a changed one; ValueError if it is not valid."""
         snapshot = parse_machine_text(text)
-        self.known = {name: known_of(one) for name, one in snapshot.configurations.items()}
+        self.known = {name: actuator_view.known_of(one) for name, one in snapshot.configurations.items()}
         self._had_placeholder |= {name for name, one in self.known.items() if one.has_placeholder}
         if snapshot.file.document is not None:
             machine, _ = machine_of(snapshot, self._definitions_of(snapshot.file.topics.values()))
@@ -174,12 +166,12 @@ class NodeView:
 
     def _hold(self, actuator: str, record: Any, received: int) -> None:
         if actuator in self.held:
-            self.held[actuator] = take(self.held[actuator], record, received)
+            self.held[actuator] = actuator_view.take(self.held[actuator], record, received)
             if isinstance(record, FrictionEstimate) and record.stamp != NEVER:
                 follower = self._followers.setdefault(actuator, Follower(self._remembered))
-                follower.add(sample_of(self.known[actuator], self.held[actuator]))
+                follower.add(actuator_view.sample_of(self.known[actuator], self.held[actuator]))
                 if actuator in self._tracking:
-                    self._tracking[actuator].add(tracked_of(self.held[actuator]))
+                    self._tracking[actuator].add(actuator_view.tracked_of(self.held[actuator]))
 
     def findings(self, actuator: str, until: int | None = None) -> list[Finding]:
         """Findings on the run of an actuator up to a stamp [ns], or to the second in which the stream is."""

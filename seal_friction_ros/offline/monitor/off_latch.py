@@ -122,10 +122,7 @@ class OffLatch:
     def document(self, scales: Sequence[Scale], unread: Mapping[str, str], now: int) -> dict[str, Any] | None:
         """The state for the page: a line an actuator, failures first, and what OFF had to undo; None: not latched.
 
-        Args:
-            scales: What is known.
-            unread: Nodes whose configuration is not known, and why.
-            now: [ns]
+        ``unread`` are the nodes whose configuration is not known, and why.
         """
         if self.since is None:
             return None

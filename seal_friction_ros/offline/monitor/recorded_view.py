@@ -4,6 +4,7 @@ import math
 import time
 from array import array
 from collections.abc import Iterable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,32 +14,12 @@ from seal_friction_ros.core.estimation.findings import BAD, STATUS_WORDS, USUAL,
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.messages.coder import DECODERS
 from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, ESTIMATE_TYPE, MACHINE_TYPE
+from seal_friction_ros.offline.bags import bag as bags
 from seal_friction_ros.offline.bags.actuator_bag import RECORDED
-from seal_friction_ros.offline.bags.bag import (
-    BagError,
-    BagMessage,
-    DamagedError,
-    bag_end,
-    bag_topics,
-    read_definitions,
-    read_messages,
-)
+from seal_friction_ros.offline.bags.bag import BagError, BagMessage
 from seal_friction_ros.offline.bags.mapped_bag import MACHINE_CONFIGURATION, MappingFile, machine_messages
-from seal_friction_ros.offline.monitor.actuator_view import (
-    COLUMNS,
-    RECENT,
-    TOO_OLD,
-    Held,
-    Known,
-    Row,
-    finite,
-    frame,
-    next_interval,
-    recent_bits,
-    row,
-    serious_words,
-    situation,
-)
+from seal_friction_ros.offline.monitor import actuator_view
+from seal_friction_ros.offline.monitor.actuator_view import COLUMNS, RECENT, TOO_OLD, Held, Known, Row
 from seal_friction_ros.offline.monitor.live_view import RATE
 from seal_friction_ros.offline.monitor.node_view import NodeView
 
@@ -53,13 +34,7 @@ _SERIOUS = sum(map(int, STATUS_WORDS)) & ~int(USUAL)
 
 
 class _Track:
-    """What is kept of one actuator.
-
-    Args:
-        start: Number of its first row: the actuator may appear in the middle of a bag.
-        view: Its node.
-        actuator: Its name there.
-    """
+    """What is kept of an actuator of a node, from row ``start`` on: it may appear in the middle of a bag."""
 
     def __init__(self, start: int, view: NodeView, actuator: str) -> None:
         self._view, self._actuator = view, actuator
@@ -72,7 +47,7 @@ class _Track:
         """Add a row, and after some of them a moment; arguments as of `row`."""
         if len(self.rows) // len(COLUMNS) % _ROWS_A_MOMENT == 0:
             self.moments.append((known, held))
-        numbers = row(known, held, time, since)
+        numbers = actuator_view.row(known, held, time, since)
         if self.first == math.inf and numbers[COLUMNS.index('estimate')] is not None:
             self.first = time
         self.rows.extend(math.nan if value is None else value for value in numbers)
@@ -95,16 +70,12 @@ class _Track:
         slides = np.flatnonzero(np.isfinite(low))  # there is a band while the rod slides
         turns = slides[1:][np.diff(np.sign(friction[slides])) != 0]
         return {
-            'curve': [[finite(float(value)) for value in point] for point in curve],
+            'curve': [[actuator_view.finite(float(value)) for value in point] for point in curve],
             'reversals': [time[place] for place in turns[:: len(turns) // _PARTS + 1]],
         }
 
     def faults(self, gap: float) -> list[tuple[float, float, str]]:
-        """Begin and end [s] of each stretch with a fault or without estimates, and its words.
-
-        Args:
-            gap: Longest time from one fault to the next in a stretch [s].
-        """
+        """Begin and end [s] of each stretch with a fault or without estimates, and its words; ``gap`` [s] ends one."""
         time, estimate, status = self._columns('time', 'estimate', 'status')
         newest = np.maximum.accumulate(np.where(np.isnan(estimate), -math.inf, time))
         silent = np.isfinite(newest) & (time - newest > TOO_OLD)
@@ -113,7 +84,7 @@ class _Track:
         found = []
         for places in np.split(wrong, np.flatnonzero(np.diff(time[wrong]) > gap) + 1) if len(wrong) else ():
             words = ['no estimate'] * bool(silent[places].any())
-            words += serious_words(int(np.bitwise_or.reduce(bits[places])))
+            words += actuator_view.serious_words(int(np.bitwise_or.reduce(bits[places])))
             found.append((float(time[places[0]]), float(time[places[-1]]), '; '.join(words)))
         return found
 
@@ -135,18 +106,13 @@ def _as_row(values: 'array[float]') -> Row:
 class RecordedView:
     """A bag, sampled at the pace of the live view: to its first estimate at once, the rest by `read` or `load`.
 
-    Args:
-        bag: The bag.
-        mapping: Of its machine, if the bag does not hold it; then the estimates are made here.
-
-    Raises:
-        BagError: The bag cannot be read, or has no estimates.
-        ValueError: The mapping does not fit the bag.
+    With a ``mapping`` the estimates are made here. BagError: the bag cannot be read, or has no estimates; ValueError:
+    the mapping does not fit the bag.
     """
 
     def __init__(self, bag: Path, mapping: MappingFile | None = None) -> None:
         self._bag = bag
-        known = bag_topics(bag)
+        known = bags.bag_topics(bag)
         types = {topic: info.type_name for topic, info in known.items() if info.message_count}
         answers = (ESTIMATE_TYPE, MACHINE_TYPE)
         if not types:
@@ -159,8 +125,8 @@ class RecordedView:
         self._acted = {topic for topic in known if topic.endswith(RECORDED)}
         self._nodes = _nodes(bag, types, has_recorded=bool(self._acted))
         self._tracks: dict[str, _Track] = {}
-        self._first = next((message.log_time for message in read_messages(bag) if message.log_time), 0)
-        self._duration = max((bag_end(bag) - self._first) * 1e-9, 0.0)
+        self._first = next((message.log_time for message in bags.read_messages(bag) if message.log_time), 0)
+        self._duration = max((bags.bag_end(bag) - self._first) * 1e-9, 0.0)
         self._period = max(1.0 / RATE, self._duration / MOST_ROWS)
         self._read_until, self._is_read = 0.0, False
         self._failure: list[Finding] = []
@@ -191,7 +157,7 @@ class RecordedView:
     def _not_read(self, error: Exception) -> Finding:
         reason = ' '.join(str(error).split()) or type(error).__name__
         after = 'mend what it names: what comes after it is not shown'
-        if isinstance(error, DamagedError):
+        if isinstance(error, bags.DamagedError):
             after = f'save the rest: seal_friction recover {self._bag}'
         return Finding(BAD, f'not read to its end: {reason}', after)
 
@@ -227,18 +193,20 @@ class RecordedView:
             for actuator, known in view.known.items():
                 track = self._tracks.setdefault(view.label(actuator), _Track(number, view, actuator))
                 track.add(known, view.held[actuator], time, now - round(self._period * 1e9))
-                view.held[actuator] = next_interval(view.held[actuator])
+                view.held[actuator] = actuator_view.next_interval(view.held[actuator])
         return time
 
     # --- for the page ---
 
     def describe(self) -> dict[str, Any]:
         """What does not change, and what has been read; ``loaded`` [s] is the duration once all is."""
-        name = self._bag.resolve().name
-        about = {'mode': 'bag', 'name': name, 'columns': COLUMNS, 'can_change': False, 'start': str(self._first)}
         gap = max(RECENT, 2.0 * self._period, self._duration / _MOST_MARKS)
         return {
-            **about,
+            'mode': 'bag',
+            'name': self._bag.resolve().name,
+            'columns': COLUMNS,
+            'can_change': False,
+            'start': str(self._first),
             'duration': round(self._duration, 3),
             'period': self._period,
             'loaded': round(self._duration if self._is_read else self._end, 3),
@@ -259,7 +227,7 @@ class RecordedView:
         first = max(math.floor(since / self._period), last - _MOST_ROWS_AT_ONCE)
         every = {name: self._situation(track, last) for name, track in self._tracks.items()}
         rows = self._tracks[label].slice(first, max(last, 0))
-        return frame(label, end, rows, every, node=self._bag.resolve().name, diagnostics=[])
+        return actuator_view.frame(label, end, rows, every, node=self._bag.resolve().name, diagnostics=[])
 
     def _situation(self, track: _Track, last: int) -> dict[str, Any]:
         """Words of the moment at a row or up to `_ROWS_A_MOMENT` rows before."""
@@ -269,7 +237,8 @@ class RecordedView:
         is_end = self._is_read and last >= round(self._end / self._period) - 1
         found = [*self._failure, *track.findings(held, is_end=is_end)]
         now = self._first + round(time * 1e9)
-        return situation(known, held, recent_bits(reversed(rows), time), now, findings=found)
+        bits = actuator_view.recent_bits(reversed(rows), time)
+        return actuator_view.situation(known, held, bits, now, findings=found)
 
 
 def _nodes(bag: Path, types: dict[str, str], *, has_recorded: bool) -> list[tuple[NodeView, set[str]]]:
@@ -278,14 +247,9 @@ def _nodes(bag: Path, types: dict[str, str], *, has_recorded: bool) -> list[tupl
     An estimator is known by its configuration; without one every topic of estimates is one. Topics belong to the
     estimator in whose namespace they are; if there is only one, to that.
     """
-
-    def definitions(kinds: Iterable[str]) -> Any:
-        return read_definitions(bag, kinds)
-
-    configured = [topic for topic, kind in types.items() if kind == CONFIGURATION_TYPE]
-    names = {topic.removesuffix(_CONFIGURATION): topic.removesuffix(_CONFIGURATION) for topic in configured}
-    if not names:
-        names = {topic: topic for topic, kind in types.items() if kind == ESTIMATE_TYPE}
+    configured = [topic.removesuffix(_CONFIGURATION) for topic, kind in types.items() if kind == CONFIGURATION_TYPE]
+    names = configured or [topic for topic, kind in types.items() if kind == ESTIMATE_TYPE]
+    definitions = partial(bags.read_definitions, bag)
     views = [NodeView(name, definitions, math.inf, has_recorded=has_recorded) for name in names]
     if not configured:
         for view in views:

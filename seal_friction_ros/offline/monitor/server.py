@@ -46,16 +46,9 @@ class RefusalError(HTTPError):
 
 
 class MonitorServer:
-    """Serves one view.
+    """Serves one view, at any free port if ``port`` is 0; every request needs the ``token``, a new one if it is empty.
 
-    Args:
-        view: What to show.
-        port: Port; 0: any free one.
-        token: That every request needs; empty: a new one.
-        work: Done step by step while nothing is asked for.
-
-    Raises:
-        ValueError: The port is in use.
+    ``work`` is done step by step while nothing is asked for. ValueError: the port is in use.
     """
 
     def __init__(
@@ -256,18 +249,12 @@ class _Handler(RequestHandler):
         self.finish(_json(document))
 
     def _number(self, name: str, default: float) -> float:
-        """A finite number of the query.
-
-        Raises:
-            RefusalError: It is none.
-        """
-        try:
+        """A finite number of the query; RefusalError if it is none."""
+        with suppress(ValueError):
             value = float(self.get_query_argument(name, str(default)))
-        except ValueError:
-            value = float('nan')
-        if not abs(value) < 1e15:
-            raise RefusalError(HTTPStatus.BAD_REQUEST, f'{name} is not a finite number')
-        return value
+            if abs(value) < 1e15:
+                return value
+        raise RefusalError(HTTPStatus.BAD_REQUEST, f'{name} is not a finite number')
 
 
 def _json(document: Any) -> bytes:

@@ -17,8 +17,7 @@ def new_token() -> str:
 def kept_token(path: Path) -> str:
     """The token in a file, which is made for this user alone (0600) if there is none.
 
-    Raises:
-        ValueError: Others can read or write the file, it holds no token, or it cannot be read or made.
+    ValueError: others can read or write the file, it holds no token, or it cannot be read or made.
     """
     try:
         try:

@@ -27,14 +27,7 @@ STATE_COLOURS = {
 }
 TIME_LABEL = 'time since the first estimate [s]'
 PRESSURE_LABEL = 'pressure at the seals [bar, gauge]'
-_FAULTS = (
-    Status.PRESSURE_OUT_OF_RANGE
-    | Status.FORCE_OUT_OF_RANGE
-    | Status.VELOCITY_OUT_OF_RANGE
-    | Status.PRESSURE_LEAP
-    | Status.FORCE_LEAP
-    | Status.VELOCITY_LEAP
-)
+_FAULTS = sum(bit for bit in Status if bit.name and bit.name.endswith(('_OUT_OF_RANGE', '_LEAP')))
 """Status bits of inputs that say nothing about the range of an axis."""
 _COLOURS = (style.BLUE, style.ORANGE, style.GREEN, style.PURPLE, style.VERMILLION)  # of pressures
 _DOTS = 12_000  # in the scatter over velocity
@@ -72,29 +65,28 @@ def friction_summary(levels: Sequence[PressureLevel]) -> str:
 
 def live_figure(run: RecordedRun, levels: Sequence[PressureLevel]) -> Plot:
     """Live estimate against measured friction: the whole bag, and a part with strokes."""
-    first, last, level = detail_window(run, levels)
+    part, level = detail_window(run, levels)
     heights = {'height_ratios': [5.0, 0.35, 6.0, 0.35], 'hspace': 0.02}
     figure, axes = style.new_figure(friction_summary(levels), 6.6, nrows=4, gridspec_kw=heights)
-    whole, part = slice(0, len(run.time)), slice(first, last + 1)
-    for strip, above in ((axes[1], axes[0]), (axes[3], axes[2])):
+    for above, strip, shown, of_level in (
+        (axes[0], axes[1], slice(0, len(run.time)), None),
+        (axes[2], axes[3], part, level),
+    ):
         strip.sharex(above)
-    _draw_friction(axes[0], run, whole, None)
-    _draw_states(axes[1], run, whole)
-    axes[0].axvspan(run.time[first], run.time[last], color=style.BLACK, alpha=0.08, lw=0)
-    _draw_friction(axes[2], run, part, level)
-    _draw_states(axes[3], run, part)
+        _draw_friction(above, run, shown, of_level)
+        _draw_states(strip, run, shown)
+        strip.set_xlabel(TIME_LABEL, loc='left')
+    axes[0].axvspan(*run.time[[part.start, part.stop - 1]], color=style.BLACK, alpha=0.08, lw=0)
     axes[2].set_title('Shaded part' if level is None else f'Shaded part, at {level.pressure / BAR:.1f} bar')
     spacing: dict[str, Any] = {'ncols': 4, 'borderaxespad': 0.0, 'handlelength': 1.0}
     axes[3].legend(loc='upper right', bbox_to_anchor=(1.0, -1.4), **spacing)
-    for strip in (axes[1], axes[3]):
-        strip.set_xlabel(TIME_LABEL, loc='left')
     if level is not None and _offset_matters(level):
         style.legend_above(axes[2], slice(1, 3))  # the legend of the first panel names the others
     return finished('live_estimate', figure, axes[0], title='Whole bag')
 
 
-def detail_window(run: RecordedRun, levels: Sequence[PressureLevel]) -> tuple[int, int, PressureLevel | None]:
-    """First and last index of the part to enlarge, and its pressure level.
+def detail_window(run: RecordedRun, levels: Sequence[PressureLevel]) -> tuple[slice, PressureLevel | None]:
+    """Indices of the part to enlarge, and its pressure level.
 
     Two neighbouring strokes in opposite directions of the middle pressure level, with the rest before them; one stroke
     if there is no such pair; without a level the hundredth of the bag around the largest friction force.
@@ -111,15 +103,15 @@ def detail_window(run: RecordedRun, levels: Sequence[PressureLevel]) -> tuple[in
         while first > 0 and run.state[first - 1] != FrictionState.SLIDING:
             first -= 1
         margin = (other.last - first) // 20 + 1
-        return max(first - margin, 0), min(other.last + margin, len(run.time) - 1), level
+        return slice(max(first - margin, 0), min(other.last + margin + 1, len(run.time))), level
     half = max(len(run.time) // 200, 100)
     middle = int(np.argmax(np.abs(run.friction_force)))
-    return max(middle - half, 0), min(middle + half, len(run.time) - 1), None
+    return slice(max(middle - half, 0), min(middle + half + 1, len(run.time))), None
 
 
 def usable_inputs(run: RecordedRun) -> BoolArray:
     """Where the inputs have a range that says something about the axes."""
-    usable: BoolArray = run.status & int(_FAULTS) == 0
+    usable: BoolArray = run.status & _FAULTS == 0
     return usable
 
 
@@ -192,12 +184,9 @@ def inputs_figure(run: RecordedRun) -> Plot:
     axes[1].set_ylabel(f'rod velocity\n[{unit}]')
     unit, size = force_unit(max(map(abs, style.usable_range(usable, run.force_sum))))
     style.thin_line(axes[2], run.time, run.force_sum / size, color=style.BLACK, lw=1.0)
-    for ax, *curves in (
-        (axes[0], run.pressure_a / BAR, run.pressure_b / BAR),
-        (axes[1], run.velocity / speed_size),
-        (axes[2], run.force_sum / size),
-    ):
-        style.fit_axis(ax, run.time, usable, *curves)
+    style.fit_axis(axes[0], run.time, usable, run.pressure_a / BAR, run.pressure_b / BAR)
+    style.fit_axis(axes[1], run.time, usable, run.velocity / speed_size)
+    style.fit_axis(axes[2], run.time, usable, run.force_sum / size)
     axes[2].set(ylabel=f'force sum\n[{unit}]', xlabel=TIME_LABEL, xlim=(first, max(last, first + 1e-3)))
     return finished('inputs', figure, *axes, ylabel='pressure\n[bar, gauge]')
 

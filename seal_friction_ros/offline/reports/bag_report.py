@@ -4,7 +4,6 @@ import json
 from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import NamedTuple
 
 from seal_friction_ros.core.estimation import findings, strokes
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
@@ -40,21 +39,10 @@ _SHOWN_CONFIGURATIONS = 2  # so many of the first and of the last, in a bag with
 
 @house_style()
 def write_report(bag: Path, out: Path, namespace: str = '', mapping: MappingFile | None = None) -> ReportSummary:
-    """Write the report of a bag of inputs and estimates; see `write_page`.
+    """Write the report of a bag of inputs and estimates; arguments and errors as of `read_run` and `write_page`.
 
-    Args:
-        bag: The bag.
-        out: HTML file.
-        namespace: As of `open_actuator`.
-        mapping: Likewise; then the estimates are made here.
-
-    Returns:
-        Files, and as numbers `evaluation_numbers`, the verdict with all findings, ``placeholder_seals`` and
-        ``tracking``, a list of `TrackingStretch`.
-
-    Raises:
-        BagError: The bag cannot be read, or holds no estimates.
-        ValueError: The report cannot be written.
+    The numbers are `evaluation_numbers`, the verdict with all findings, ``placeholder_seals`` and ``tracking``, a list
+    of `TrackingStretch`.
     """
     run = read_run(bag, namespace, mapping)
     evaluation, tracking = bag_evaluation.evaluate_run(run), tracking_evaluation.evaluate_tracking(run)
@@ -69,11 +57,7 @@ def write_report(bag: Path, out: Path, namespace: str = '', mapping: MappingFile
         run_figures(run, evaluation) + (tracking_plots(run, tracking) if tracking else []),
         verdict=verdict._replace(next=verdict.next.replace('BAG', str(bag))),
         head=head_of(f'report {bag}', run.name, data_date(evaluation.start), seals_text(mounted_seals(run))),
-        warnings=[
-            *others,
-            *evaluation.notes,
-            *(tracking.notes if tracking else ()),
-        ],
+        warnings=[*others, *evaluation.notes, *(tracking.notes if tracking else ())],
         run=run,
         evaluation=evaluation,
         limits=strokes,
@@ -123,10 +107,7 @@ def _level_table(levels: Sequence[PressureLevel], events: str) -> Table:
     unit, size = force_unit(max((abs(level.estimated) for level in levels), default=0.0))
     columns: Columns = (
         ('pressure [bar]', lambda level: number(level.pressure, unit=BAR)),
-        (
-            f'measured [{unit}]',
-            lambda level: number(level.measured, unit=size) + _mark(level),
-        ),
+        (f'measured [{unit}]', lambda level: number(level.measured, unit=size) + _mark(level)),
         (f'spread [{unit}]', lambda level: number(level.measured_spread, unit=size)),
         (f'estimated [{unit}]', lambda level: number(level.estimated, unit=size)),
         (f'std [{unit}]', lambda level: number(level.estimated_std, unit=size)),
@@ -189,18 +170,11 @@ def _run_tables(run: RecordedRun, evaluation: BagEvaluation) -> dict[str, Table]
     }
 
 
-class _ShownConfiguration(NamedTuple):
-    """One configuration of the bag; only ``text`` if it cannot be parsed."""
+def _shown_configurations(run: RecordedRun) -> Iterator[tuple[float, Sequence[Table], Sequence[str]]]:
+    """The first and the last configurations: time [s], tables of seals and settings, JSON of each different seal.
 
-    time: float  # [s] since the first estimate
-    text: str
-    seal_table: Table | None = None
-    setting_table: Table | None = None
-    seals: Sequence[str] = ()  # JSON of each different seal
-
-
-def _shown_configurations(run: RecordedRun) -> Iterator[_ShownConfiguration]:
-    """The first and the last configurations: settings with units and meanings, and the seals."""
+    One that cannot be parsed is shown as its text.
+    """
     shown, known = run.configurations, meanings(EstimatorSettings)
     if len(shown) > 2 * _SHOWN_CONFIGURATIONS + 1:
         shown = (*shown[:_SHOWN_CONFIGURATIONS], *shown[-_SHOWN_CONFIGURATIONS:])
@@ -211,10 +185,9 @@ def _shown_configurations(run: RecordedRun) -> Iterator[_ShownConfiguration]:
             mounted = list(zip(selection['seals'], selection['seal_chambers'], strict=True))
             seals = [json.dumps(seal, indent=2, ensure_ascii=False) for seal in document['seal_documents']]
         except (ValueError, LookupError, TypeError):
-            yield _ShownConfiguration(time, text)
+            yield time, (), (text,)
             continue
         described = [(name, value, known.get(name, Meaning('', ''))) for name, value in sorted(settings.items())]
         rows = [(name, value, meaning.unit, meaning.description) for name, value, meaning in described]
         setting_table = Table(('setting', *PARAMETER_HEADS[1:]), rows, (0, 2, 3))
-        seal_table = Table(('seal', 'chamber'), mounted, (0, 1))
-        yield _ShownConfiguration(time, text, seal_table, setting_table, list(dict.fromkeys(seals)))
+        yield time, (Table(('seal', 'chamber'), mounted, (0, 1)), setting_table), list(dict.fromkeys(seals))

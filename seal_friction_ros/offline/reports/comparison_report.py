@@ -17,24 +17,16 @@ from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun, read_run
-from seal_friction_ros.offline.replay import tracking_evaluation
 from seal_friction_ros.offline.replay.run_findings import run_findings
-from seal_friction_ros.offline.replay.tracking_evaluation import TrackingEvaluation
-from seal_friction_ros.offline.reports import bag_evaluation, verdicts
+from seal_friction_ros.offline.replay.tracking_evaluation import TrackingEvaluation, evaluate_tracking
 from seal_friction_ros.offline.reports import figure_style as style
+from seal_friction_ros.offline.reports import verdicts
+from seal_friction_ros.offline.reports.bag_evaluation import BagEvaluation, evaluate_run
 from seal_friction_ros.offline.reports.bag_figures import PRESSURE_LABEL, usable_inputs
 from seal_friction_ros.offline.reports.bag_report import data_date, mounted_seals
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, number
-from seal_friction_ros.offline.reports.page import (
-    Columns,
-    ReportSummary,
-    Table,
-    head_of,
-    seals_text,
-    table_of,
-    write_page,
-)
+from seal_friction_ros.offline.reports.page import Columns, ReportSummary, head_of, seals_text, table_of, write_page
 
 NOISE = SMALL_CHANGE  # [-] of a change, where too few strokes tell (our choice)
 SAME_PRESSURE = 0.05  # [-] of the highest pressure, by which pressures of both runs may differ (our choice)
@@ -60,10 +52,12 @@ class Change(NamedTuple):
 class _Run(NamedTuple):
     name: str
     run: RecordedRun
-    levels: Sequence[PressureLevel]
-    breakaway: Sequence[PressureLevel]
+    evaluation: BagEvaluation
     tracking: TrackingEvaluation | None
-    findings: Sequence[Finding]
+
+    @property
+    def levels(self) -> Sequence[PressureLevel]:
+        return self.evaluation.friction.sliding
 
 
 def is_seal(path: Path) -> bool:
@@ -75,17 +69,10 @@ def is_seal(path: Path) -> bool:
 def write_comparison(
     a: Path, b: Path, out: Path, namespace: str = '', mapping: MappingFile | None = None
 ) -> ReportSummary:
-    """Write the page of two bags or of two seal files; see `write_page`.
+    """Write the page of two bags or of two seal files; changes are relative to the first.
 
-    Args:
-        a: The first one, which changes are relative to.
-        b: The second one.
-        out: HTML file.
-        namespace: Of bags, as of `open_actuator`.
-        mapping: Likewise.
-
-    Raises:
-        ValueError: One is a bag and the other a seal file, or one of them cannot be read.
+    ``namespace`` and ``mapping`` are of bags, as of `open_actuator`. ValueError: one is a bag and the other a seal
+    file, or one of them cannot be read.
     """
     if is_seal(a) != is_seal(b):
         raise ValueError(f'{a}, {b}: one is a bag and the other a seal file: give two of a kind')
@@ -98,22 +85,19 @@ def write_comparison(
 def _compare_runs(a: Path, b: Path, out: Path, namespace: str, mapping: MappingFile | None) -> ReportSummary:
     names = (a.name, b.name) if a.name != b.name else (str(a), str(b))
     runs = tuple(_read(path, name, namespace, mapping) for path, name in zip((a, b), names, strict=True))
-    changes = common_changes(runs[0].levels, runs[1].levels)
-    starts = common_changes(runs[0].breakaway, runs[1].breakaway)
-    told = (
-        mean_change('sliding friction', changes),
-        mean_change('breakaway force', starts),
-        _tracking_change(runs[0].tracking, runs[1].tracking),
-    )
+    changes = common_changes(*(one.levels for one in runs))
+    starts = common_changes(*(one.evaluation.friction.breakaway for one in runs))
+    told = mean_change('sliding friction', changes), mean_change('breakaway force', starts), _tracking_change(*runs)
     known = [one for one in told if one is not None]
     plots = [_pressure_figure(runs, changes), _velocity_figure(runs)]
-    facts = [
-        f'{name}: {data_date(one.run.start)}, {seals_text(mounted_seals(one.run))}'
-        for name, one in zip(names, runs, strict=True)
-    ]
+    facts = [f'{one.name}: {data_date(one.run.start)}, {seals_text(mounted_seals(one.run))}' for one in runs]
     change = verdicts.of_runs(known, names)
     between = Finding(change.level, change.text.rstrip('.'), change.next.rstrip('.'))
-    own = [*runs[0].findings, *runs[1].findings]
+    own = [
+        found._replace(name=one.name)
+        for one in runs
+        for found in run_findings(one.run, one.evaluation.seen, one.tracking)
+    ]
     is_small = all(abs(size) <= SMALL_CHANGE for _, size, _ in known)  # then what is wrong with a run decides
     verdict = verdict_of([*(one for one in own if is_small and one.level != GOOD), between, *own])
     found = {'sliding': changes, 'breakaway': starts}
@@ -122,9 +106,7 @@ def _compare_runs(a: Path, b: Path, out: Path, namespace: str, mapping: MappingF
 
 def _read(path: Path, name: str, namespace: str, mapping: MappingFile | None) -> _Run:
     run = read_run(path, namespace, mapping)
-    evaluation, tracking = bag_evaluation.evaluate_run(run), tracking_evaluation.evaluate_tracking(run)
-    found = [one._replace(name=name) for one in run_findings(run, evaluation.seen, tracking)]
-    return _Run(name, run, evaluation.friction.sliding, evaluation.friction.breakaway, tracking, found)
+    return _Run(name, run, evaluate_run(run), evaluate_tracking(run))
 
 
 def common_changes(before: Sequence[PressureLevel], then: Sequence[PressureLevel]) -> list[Change]:
@@ -158,20 +140,16 @@ def mean_change(name: str, changes: Sequence[Change]) -> tuple[str, float, float
     return name, float(np.mean([change.relative for change in changes])), noise
 
 
-def _tracking_change(
-    before: TrackingEvaluation | None, then: TrackingEvaluation | None
-) -> tuple[str, float, float] | None:
+def _tracking_change(*runs: _Run) -> tuple[str, float, float] | None:
     """Change of the tracking error, of the last stretch of each."""
-    if not (before and before.stretches and then and then.stretches):
-        return None
-    was, now = before.stretches[-1].rms, then.stretches[-1].rms
-    return ('tracking error', now / was - 1.0, NOISE) if was > 0.0 else None
+    errors = [one.tracking.stretches[-1].rms for one in runs if one.tracking and one.tracking.stretches]
+    known = len(errors) == len(runs) and errors[0] > 0.0
+    return ('tracking error', errors[1] / errors[0] - 1.0, NOISE) if known else None
 
 
 def _pressure_figure(runs: Sequence[_Run], changes: Sequence[Change]) -> Plot:
-    mean = mean_change('', changes)
     title = 'Measured sliding friction of both runs'
-    if mean is not None:
+    if mean := mean_change('', changes):
         title = f'Sliding friction changed by {100.0 * mean[1]:+.1f} % on average'
     figure, ax = style.new_figure(title, 4.6)
     unit, size = force_unit(max((level.measured for one in runs for level in one.levels), default=1.0))
@@ -233,9 +211,8 @@ def _compare_seals(a: Path, b: Path, out: Path) -> ReportSummary:
     labels = {'xlabel': 'pressure [bar, gauge]', 'ylabel': f'Coulomb friction of one seal [{unit}]'}
     plot = finished('friction_over_pressure', figure, ax, ylim=(0.0, None), **labels)
     # The bands of a seal file hold at all pressures together, so a mean over them is no better known.
-    told = [] if not changes else [
-        ('Coulomb friction', float(np.mean([one.relative for one in changes])), max(one.noise for one in changes))
-    ]  # fmt: skip
+    mean = mean_change('Coulomb friction', changes)
+    told = [] if mean is None else [(*mean[:2], max(one.noise for one in changes))]
     found: dict[str, list[Change]] = {'sliding': changes, 'breakaway': []}
     return _write(out, f'compare {a} {b}', names, [], [plot], told, found, verdicts.of_runs(told, names))
 
@@ -253,19 +230,6 @@ def _write(
     changes: dict[str, list[Change]],
     verdict: Verdict,
 ) -> ReportSummary:
-    tables = {name: _table(names, found) for name, found in changes.items()}
-    figures = write_page(
-        out, 'comparison', plots, verdict=verdict, head=head_of(command, *facts), names=names, tables=tables, told=told
-    )
-    numbers: dict[str, Any] = {
-        name: [one._asdict() | {'change': one.relative} for one in found] for name, found in changes.items()
-    }
-    numbers |= {'level': verdict.level, 'verdict': verdict.text}
-    numbers['changes'] = {name: {'change': change, 'noise': noise} for name, change, noise in told}
-    return ReportSummary(out, figures, numbers)
-
-
-def _table(names: tuple[str, str], changes: Sequence[Change]) -> Table:
     columns: Columns = (
         ('pressure [bar]', lambda one: number(one.pressure, unit=BAR)),
         (f'{names[0]} [N]', lambda one: number(one.before)),
@@ -273,4 +237,12 @@ def _table(names: tuple[str, str], changes: Sequence[Change]) -> Table:
         ('change [%]', lambda one: number(one.relative, 1, unit=0.01, signed=True)),
         ('noise [%]', lambda one: number(one.noise, 1, unit=0.01)),
     )
-    return table_of(changes, columns)
+    tables = {name: table_of(found, columns) for name, found in changes.items()}
+    values: dict[str, Any] = {'names': names, 'tables': tables, 'told': told}
+    figures = write_page(out, 'comparison', plots, verdict=verdict, head=head_of(command, *facts), **values)
+    numbers: dict[str, Any] = {
+        name: [one._asdict() | {'change': one.relative} for one in found] for name, found in changes.items()
+    }
+    numbers |= {'level': verdict.level, 'verdict': verdict.text}
+    numbers['changes'] = {name: {'change': change, 'noise': noise} for name, change, noise in told}
+    return ReportSummary(out, figures, numbers)

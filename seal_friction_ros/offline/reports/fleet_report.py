@@ -12,11 +12,11 @@ import numpy as np
 from seal_friction_ros.core.estimation.findings import BAD, GOOD, LOOK, SMALL_CHANGE, Verdict, worst
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.offline.replay.bag_summary import DIFFERENT, BagSummary
-from seal_friction_ros.offline.replay.health_indicators import NOT_TOLD, Value, trend
+from seal_friction_ros.offline.replay.health_indicators import NOT_TOLD, UNKNOWN_DAY, Day, Value, trend
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import FIRST_DATE, date_text
-from seal_friction_ros.offline.reports.page import ReportSummary, head_of, script, write_page
+from seal_friction_ros.offline.reports.page import ReportSummary, head_of, write_page
 from seal_friction_ros.offline.work.outcome import Outcome
 from seal_friction_ros.offline.work.places import Place
 
@@ -36,7 +36,7 @@ class FleetBag(NamedTuple):
 
 
 class Rig(NamedTuple):
-    """The bags of one folder, which count as those of one rig (our choice)."""
+    """The bags of one folder, which count as those of one rig (our choice); NaN where they do not tell."""
 
     name: str
     level: str  # of its worst bag, or of its change
@@ -62,13 +62,6 @@ def judged(path: Place, outcome: Outcome[BagSummary]) -> FleetBag:
     return FleetBag(path, found.level, found.why, found)
 
 
-class _Point(NamedTuple):
-    """Scale of a bag at its time, for `trend`."""
-
-    time: float  # [s]
-    scale: Value
-
-
 def rigs_of(bags: Sequence[FleetBag]) -> list[Rig]:
     """The folders of the bags: those whose friction has changed most first, then the worst, then by name."""
     folders: dict[str, list[FleetBag]] = {}
@@ -85,15 +78,17 @@ def _folder(bag: FleetBag) -> str:
     return str(bag.path.parent) if isinstance(bag.path, Path) else bag.path.rpartition('/')[0]
 
 
-def _points(bags: Sequence[FleetBag]) -> list[_Point]:
-    """Scale of each bag that has one and a date, in order of time."""
-    seen = [bag.summary for bag in bags if bag.summary is not None]
-    points = [_Point(one.start + 0.5 * one.duration, Value(one.scale, one.scale_std)) for one in seen]
-    return sorted(one for one in points if one.time > FIRST_DATE and math.isfinite(one.scale.value))
+def _days(bags: Sequence[FleetBag]) -> list[Day]:
+    """Time and scale of each bag that has one and a date, in order of time."""
+    seen = [bag.summary for bag in bags if bag.summary is not None and math.isfinite(bag.summary.scale)]
+    days = [
+        UNKNOWN_DAY._replace(time=one.start + 0.5 * one.duration, scale=Value(one.scale, one.scale_std)) for one in seen
+    ]
+    return sorted((day for day in days if day.time > FIRST_DATE), key=lambda day: (day.time, day.scale))
 
 
 def _rig(name: str, bags: Sequence[FleetBag]) -> Rig:
-    seen, points = [bag.summary for bag in bags if bag.summary is not None], _points(bags)
+    seen, points = [bag.summary for bag in bags if bag.summary is not None], _days(bags)
     slope = trend(points, 'scale') if any(point.scale.std > 0.0 for point in points) else NOT_TOLD
     slope = slope if abs(slope.value) > slope.std else NOT_TOLD
     change, since = _change(points)
@@ -104,20 +99,20 @@ def _rig(name: str, bags: Sequence[FleetBag]) -> Rig:
     scales = [one.scale for one in seen if math.isfinite(one.scale)]
     shares = [one.disagreeing for one in seen if math.isfinite(one.disagreeing)]
     return Rig(
-        name,
-        level,
-        '; '.join(why),
-        change,
-        since,
-        len(bags),
-        len(bags) - len(seen),
-        float(np.median(scales)) if scales else math.nan,
-        Value(slope.value * HOURS_A_DAY, slope.std * HOURS_A_DAY),
-        float(np.mean(shares)) if shares else math.nan,
+        name=name,
+        level=level,
+        why='; '.join(why),
+        change=change,
+        since=since,
+        bags=len(bags),
+        damaged=len(bags) - len(seen),
+        scale=float(np.median(scales)) if scales else math.nan,
+        trend=Value(slope.value * HOURS_A_DAY, slope.std * HOURS_A_DAY),
+        disagreeing=float(np.mean(shares)) if shares else math.nan,
     )
 
 
-def _change(points: Sequence[_Point]) -> tuple[float, float]:
+def _change(points: Sequence[Day]) -> tuple[float, float]:
     """Relative change of the friction, and the time of the first bag with it; NaN if the bags do not tell one.
 
     The bags are split where the sum of the deviations from their mean is largest.
@@ -133,53 +128,36 @@ def _change(points: Sequence[_Point]) -> tuple[float, float]:
     return (change, points[first].time) if is_told else (math.nan, math.nan)
 
 
-def fleet_numbers(bags: Sequence[FleetBag]) -> dict[str, Any]:
-    """Numbers for JSON, without the pressure levels."""
-    counts, rigs = {level: sum(bag.level == level for bag in bags) for level in _ORDER}, rigs_of(bags)
+@house_style()
+def write_fleet_report(bags: Sequence[FleetBag], where: Path, out: Path) -> ReportSummary:
+    """Write the page of bags of a folder or list; the numbers are without the pressure levels."""
+    rigs = rigs_of(bags)
     verdict = _verdict(bags, rigs)
-    return {
+    numbers: dict[str, Any] = {
         'level': verdict.level,
         'verdict': verdict.text,
         'bags': [{**_plain(bag.summary), 'bag': bag.path, 'level': bag.level, 'why': bag.why} for bag in bags],
-        'rigs': [
-            {**rig._asdict(), 'trend': rig.trend.value, 'trend_std': rig.trend.std, 'name': rig.name} for rig in rigs
-        ],
-        'counts': counts,
+        'rigs': [rig._asdict() | {'trend': rig.trend.value, 'trend_std': rig.trend.std} for rig in rigs],
+        'counts': {level: sum(bag.level == level for bag in bags) for level in _ORDER},
         'damaged': sum(bag.summary is None for bag in bags),
     }
-
-
-def _plain(summary: BagSummary | None) -> dict[str, Any]:
-    if summary is None:
-        return {}
-    return {name: value for name, value in summary._asdict().items() if name != 'levels'}
-
-
-@house_style()
-def write_fleet_report(bags: Sequence[FleetBag], where: Path, out: Path) -> ReportSummary:
-    """Write the page.
-
-    Args:
-        bags: The bags.
-        where: Folder or list that they are from.
-        out: HTML file.
-    """
-    numbers = fleet_numbers(bags)
-    rigs = rigs_of(bags)
     figures = write_page(
         out,
         'fleet',
         [_figure(bags, rigs)],
-        verdict=_verdict(bags, rigs),
+        verdict=verdict,
         head=head_of('fleet', f'{len(bags)} bags', f'{len(rigs)} folders', str(where)),
         heads=[name for name, *_ in _COLUMNS],
         count=len(bags),
         rows=_rows(bags, out),
         rigs=rigs,
         text=_text,
-        sorting=script('sorting.js'),
     )
     return ReportSummary(out, figures, numbers)
+
+
+def _plain(summary: BagSummary | None) -> dict[str, Any]:
+    return {} if summary is None else {name: v for name, v in summary._asdict().items() if name != 'levels'}
 
 
 def _verdict(bags: Sequence[FleetBag], rigs: Sequence[Rig]) -> Verdict:
@@ -190,12 +168,10 @@ def _verdict(bags: Sequence[FleetBag], rigs: Sequence[Rig]) -> Verdict:
         return Verdict(GOOD, said, 'nothing; look again after the next recordings.')
     bad, look = (sum(bag.level == one for bag in bags) for one in (BAD, LOOK))
     damaged = sum(bag.summary is None for bag in bags)
-    counted = (
-        f'{bad} of {total} {"bag" if total == 1 else "bags"} {"is" if bad == 1 else "are"} bad, {damaged} damaged; '
-    )
+    counted = f'{bad} of {total} bag{"" if total == 1 else "s"} {"is" if bad == 1 else "are"} bad, {damaged} damaged'
     first = [rig for rig in rigs if not math.isnan(rig.change)][:_MOST_NAMED] or rigs[:1]
     named = '; '.join(f'{Path(rig.name).name}: {rig.why.rstrip(".")}' for rig in first)
-    text = f'{counted}{look} to look at. {named}.'
+    text = f'{counted}; {look} to look at. {named}.'
     return Verdict(level, text, 'seal_friction report BAG --out PAGE.html shows a bag in full.')
 
 
@@ -245,7 +221,7 @@ def _page_of(bag: Place, out: Path) -> str:
 def _figure(bags: Sequence[FleetBag], rigs: Sequence[Rig]) -> Plot:
     """Friction over that of the seal file, a curve a rig over its dates."""
     figure, axes = style.new_figure('Friction over that of the seal file, each rig over its dates', 3.4)
-    known = {rig.name: _points([bag for bag in bags if _folder(bag) == rig.name]) for rig in rigs}
+    known = {rig.name: _days([bag for bag in bags if _folder(bag) == rig.name]) for rig in rigs}
     begin = min((points[0].time for points in known.values() if points), default=0.0)
     for number, (name, points) in enumerate(known.items()):
         if points:

@@ -5,6 +5,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.offline.replay.bag_summary import LEVEL_COLUMNS, BagSummary
 from seal_friction_ros.offline.reports.fleet_report import FleetBag
 from seal_friction_ros.offline.work.atomic_file import write_whole
@@ -18,13 +19,7 @@ _OF_LEVEL = [f'level_{name}' for name in LEVEL_COLUMNS]
 def write_fleet_table(bags: Sequence[FleetBag], out: Path) -> None:
     """Write the table; SI units, null where a bag does not tell. A bag without a pressure level has one row.
 
-    Args:
-        bags: The bags.
-        out: Parquet file; an existing one is replaced.
-
-    Raises:
-        MissingPackageError: pyarrow is not installed.
-        ValueError: The file cannot be written.
+    An existing file is replaced. MissingPackageError: pyarrow is not installed; ValueError: the file cannot be written.
     """
     arrow, parquet = needed('pyarrow'), needed('pyarrow.parquet')
     kinds = dict.fromkeys(('bag', 'level', 'why', *_TEXTS), arrow.string()) | dict.fromkeys(_COUNTS, arrow.int64())
@@ -33,11 +28,8 @@ def write_fleet_table(bags: Sequence[FleetBag], out: Path) -> None:
     buffer = BytesIO()
     table = arrow.Table.from_pylist([row for bag in bags for row in _rows(bag)], schema)
     parquet.write_table(table, buffer, compression='zstd')
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
+    with named_errors(f'{out}: cannot write the table', OSError):
         write_whole(out, buffer.getvalue())
-    except OSError as error:
-        raise ValueError(f'{out}: cannot write the table: {error.strerror}') from None
 
 
 def _rows(bag: FleetBag) -> Iterator[dict[str, Any]]:

@@ -30,19 +30,11 @@ INDICATORS = {
 def write_health_report(
     names: Sequence[str], seen: Sequence[BagHealth], out: Path | None, limits: Limits
 ) -> ReportSummary:
-    """Numbers and, with ``out``, the page.
-
-    Args:
-        names: Of the bags.
-        seen: What each shows, in order of time.
-        out: HTML file.
-        limits: For alarms.
-    """
+    """Numbers and, with ``out``, the page of what each bag shows, in order of time; ``limits`` are for alarms."""
     days = [day_of(name, one) for name, one in zip(names, seen, strict=True)]
-    trends = {name: trend(days, name) for name in INDICATORS}
-    changes = changes_of(seen)
-    alarms = {day.name: alarms_of(day, limits) for day in days}
-    verdict = _verdict(days, seen, list(alarms.values()), len(changes))
+    trends, changes = {name: trend(days, name) for name in INDICATORS}, changes_of(seen)
+    alarms = [alarms_of(day, limits) for day in days]
+    verdict = _verdict(days, seen, alarms, len(changes))
     numbers: dict[str, Any] = {
         'bags': [
             {
@@ -51,11 +43,11 @@ def write_health_report(
                 'reversals': day.reversals,
                 'friction_N': day.friction * day.scale.value,
                 **{key: getattr(day, name)[i] for name in INDICATORS for i, key in enumerate((name, f'{name}_std'))},
-                'alarms': [alarm.what for alarm in alarms[day.name]],
+                'alarms': [alarm.what for alarm in beyond],
                 'level': one.level,
                 'why': one.why,
             }
-            for day, one in zip(days, seen, strict=True)
+            for day, one, beyond in zip(days, seen, alarms, strict=True)
         ],
         'level': verdict.level,
         'verdict': verdict.text,
@@ -116,17 +108,14 @@ def _figure(seen: Sequence[BagHealth], changes: Sequence[dict[str, float]]) -> P
     figure, axes = style.new_figure('Friction over that of the seal file, reversal by reversal', 3.6)
     first = 0
     for number, one in enumerate(seen):
-        x = np.arange(first, first + len(one.scale))
+        x = np.arange(first, first + len(one.scale), dtype=float)
         colour = style.BLUE if number % 2 == 0 else style.VERMILLION
-        axes.fill_between(
-            x, one.scale - BAND_95 * one.scale_std, one.scale + BAND_95 * one.scale_std, color=colour, alpha=0.2, lw=0
-        )
+        style.fill_band(axes, x, one.scale, BAND_95 * one.scale_std, color=colour, alpha=0.2)
         axes.plot(x, one.scale, color=colour, lw=1.2)
         for change in changes:
             if len(one.time) and one.time[0] <= change['time_s'] <= one.time[-1]:
-                axes.axvline(
-                    first + int(np.searchsorted(one.time, change['time_s'])), color=style.BLACK, ls='--', lw=1.0
-                )
+                place = first + int(np.searchsorted(one.time, change['time_s']))
+                axes.axvline(place, color=style.BLACK, ls='--', lw=1.0)
         first += len(one.scale)
     axes.axhline(1.0, color=style.GREY, lw=0.8)
     axes.set_xlabel('reversal, all bags one after the other; dashed: a change')

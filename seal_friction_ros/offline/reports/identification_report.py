@@ -49,13 +49,7 @@ _DIRECTIONS = ((1.0, style.BLUE, 'extending'), (-1.0, style.ORANGE, 'retracting'
 def write_identification_report(
     found: Identification, out: Path, files: Mapping[str, Path] | None = None
 ) -> tuple[Path, ...]:
-    """Write the report of an identification; result and errors as of `write_page`.
-
-    Args:
-        found: The identification.
-        out: HTML file.
-        files: Kind -> its seal file, of several kinds of seals.
-    """
+    """Write the report of an identification; ``files`` are those of several kinds of seals; else as `write_page`."""
     plots, kinds = identification_figures(found), kinds_numbers(found)
     names = {kind: path.name for kind, path in (files or {}).items() if kind}
     return write_page(
@@ -63,14 +57,10 @@ def write_identification_report(
         'identification',
         plots,
         verdict=_verdict(found, list(names.values())),
-        head=head_of(
-            'identify', ', '.join(file.name for file in found.data.sources.files[:3]), 'the data have no date'
-        ),
+        head=head_of('identify', ', '.join(one.name for one in found.data.sources.files[:3]), 'the data have no date'),
         warnings=found.warnings,
         worst=worst_left_out(found.levels),
         found=found,
-        left_out_by=found.data.used.left_out_by,
-        are_samples=found.data.prepared.readings.are_samples,
         has_repeatability=bool(np.isfinite(found.quality.repeatability)),
         thesis_figures=[plot.name for plot in plots if plot.name[3:5] in {'16', '17', '18', '19'}],
         level_table=_level_table(found),
@@ -92,17 +82,13 @@ def _verdict(found: Identification, files: Sequence[str]) -> Verdict:
         parts = zip(found.data.kinds, told.friction.tolist(), told.apart_std.tolist(), strict=True)
         shares = [(kind.name, friction / total, std / total) for kind, friction, std in parts]
         return _verdict_on_kinds(selection.validation.error, shares, files)
-    numbers = verdicts.IdentificationNumbers(
-        law=selection.law.name,
-        error=selection.validation.error,
-        worst=worst_left_out(found.levels),
-        coverage=quality.coverage,
-        unsound=selection.fit.why_unsound,
-        outlier=found.data.outlier is not None,
-        changed=any(change.is_changed for change in quality.changes),
-        drifted=any(level.is_used and abs(level.drift) > diagnostics.SETTLED for level in found.levels),
-    )
-    return verdicts.of_identification(numbers)
+    remarks = {
+        'outlier': found.data.outlier is not None,
+        'changed': any(change.is_changed for change in quality.changes),
+        'drifted': any(level.is_used and abs(level.drift) > diagnostics.SETTLED for level in found.levels),
+    }
+    numbers = selection.validation.error, worst_left_out(found.levels), quality.coverage, selection.fit.why_unsound
+    return verdicts.of_identification(selection.law.name, *numbers, *filter(remarks.get, remarks))
 
 
 def _verdict_on_kinds(error: float, shares: Sequence[tuple[str, float, float]], files: Sequence[str]) -> Verdict:
@@ -173,30 +159,19 @@ def _ladder_table(found: Identification) -> Table:
 
 def _parameter_table(found: Identification) -> Table:
     selection, errors, breakaway = found.selection, found.quality.standard_errors, found.quality.breakaway
-    (first, fit), *others = selection.fits_by_name.items()
-    rows = [
-        (
-            f'{p.name}, {first}' if others else p.name,
-            p.symbol,
-            f'{fit.values[p.name]:.5g}',
-            f'{errors[p.name]:.2g}',
-            p.unit,
-        )
-        for p in selection.law.parameters
-    ]
+    (_, first), *others = selection.fits_by_name.items()
+    rows = []
+    for name, fit in selection.fits_by_name.items():
+        for p in selection.law.parameters:
+            spread = f'{errors[p.name]:.2g}' if fit is first else DASH
+            shown = f'{p.name}, {name}' if others else p.name
+            rows.append((shown, p.symbol, f'{fit.values[p.name]:.5g}', spread, p.unit))
     rows += [(name, '', f'{value:.5g}', 'not fitted', '') for name, value in selection.law.fixed.items()]
-    rows += [
-        (f'{p.name}, {name}', p.symbol, f'{other.values[p.name]:.5g}', DASH, p.unit)
-        for name, other in others
-        for p in selection.law.parameters
-    ]
     if breakaway is not None:
         values = zip(('constant', 'share'), breakaway[1:3], breakaway.standard_errors, ('N', '1'), strict=True)
-        rows += [
-            (f'breakaway above Coulomb, {part}', '', f'{value:.5g}', f'{error:.2g}', unit)
-            for part, value, error, unit in values
-            if value
-        ]
+        for part, value, error, unit in values:
+            if value:
+                rows.append((f'breakaway above Coulomb, {part}', '', f'{value:.5g}', f'{error:.2g}', unit))
     return Table(('parameter of one seal', 'symbol', 'value', 'standard error', 'unit'), rows, (0, 1, 4))
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.ticker import FuncFormatter
 
 from seal_friction_ros.core.estimation.findings import LOOK, Verdict, percent
+from seal_friction_ros.core.foundation.arrays import BoolArray
 from seal_friction_ros.core.foundation.units import BAR, MM
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
 from seal_friction_ros.offline.contact.lubrication_runs import MARKED_MESH_ERROR, MapRuns
@@ -26,46 +27,43 @@ def write_map_page(computed: MapRuns, out: Path) -> tuple[Path, ...]:
     """Write the page of a friction map; see `write_page`."""
     shape = len(computed.rows), len(computed.law.speeds)
     errors = np.zeros(shape) if computed.mesh_error is None else np.nan_to_num(computed.mesh_error, nan=np.inf)
-    heads = ('speed [mm/s]', *(f'{row.pressure / BAR:.3g} bar' for row in computed.rows))
-    rows = [
-        (
-            number(speed / MM),
-            *(_marked(float(row.friction[i]), error[i]) for row, error in zip(computed.rows, errors, strict=True)),
-        )
-        for i, speed in enumerate(computed.law.speeds)
-    ]
-    reference = f'{number(computed.law.reference_speed / MM)}'
-    rows += [
-        (f'{reference}, {text}', *(number(each[k], 3) for each in computed.directions))
-        for k, text in enumerate(('towards the pressure', 'away from it'))
-    ]
-    table = Table(heads, rows)
-    plots = [map_figure(computed)]
+    plots, spread = [map_figure(computed)], ''
     if computed.uncertainty is not None:
         plots.append(quantiles_figure(computed.uncertainty))
-    frictions = np.concatenate([row.friction for row in computed.rows])
-    spread = ''
-    if computed.uncertainty is not None:
         spread = f', with a relative standard deviation of {percent(computed.uncertainty.relative_std)} by samples'
+    frictions = np.concatenate([row.friction for row in computed.rows])
     text = f'Friction {frictions.min():.3g} to {frictions.max():.3g} N over the map{spread}; computed, not measured.'
     after = 'write a seal file for the node: --seal-file.'
     if '--seal-file' in command_line():
         after = 'use the seal file; its band is not from measurements.'
-    verdict = Verdict(LOOK, text, after)
-    values = {
-        'verdict': verdict,
-        'law': computed.law,
-        'map_table': table,
-        'map_notes': (computed.limits, computed.mesh),
-    }
-    values |= {'is_marked': bool((errors > MARKED_MESH_ERROR).any())}
-    values |= uncertainty_values(computed.uncertainty, computed.case.unknown)
-    return write_case_page(out, 'lubrication_map', plots, computed.case, **values)
+    return write_case_page(
+        out,
+        'lubrication_map',
+        plots,
+        computed.case,
+        verdict=Verdict(LOOK, text, after),
+        law=computed.law,
+        map_table=_map_table(computed, errors > MARKED_MESH_ERROR),
+        map_notes=(computed.limits, computed.mesh),
+        is_marked=bool((errors > MARKED_MESH_ERROR).any()),
+        **uncertainty_values(computed.uncertainty, computed.case.unknown),
+    )
 
 
-def _marked(friction: float, mesh_error: float) -> str:
-    """A friction [N], with a mark if the mesh changes it."""
-    return f'{number(friction, 3)}{" *" if mesh_error > MARKED_MESH_ERROR else ""}'
+def _map_table(computed: MapRuns, marked: BoolArray) -> Table:
+    """Row for each speed and, at the reference speed, direction; ``marked`` where the mesh changes the friction."""
+    frictions = np.array([row.friction for row in computed.rows]).T
+    rows = [
+        (
+            number(speed / MM),
+            *(number(one, 3) + (' *' if mark else '') for one, mark in zip(of_speed, marks, strict=True)),
+        )
+        for speed, of_speed, marks in zip(computed.law.speeds, frictions.tolist(), marked.T.tolist(), strict=True)
+    ]
+    reference = number(computed.law.reference_speed / MM)
+    for k, text in enumerate(('towards the pressure', 'away from it')):
+        rows.append((f'{reference}, {text}', *(number(each[k], 3) for each in computed.directions)))
+    return Table(('speed [mm/s]', *(f'{row.pressure / BAR:.3g} bar' for row in computed.rows)), rows)
 
 
 def write_case_page(

@@ -21,9 +21,9 @@ from seal_friction_ros.core.oring_contact.results import OringResult, WallContac
 from seal_friction_ros.offline.contact.oring_runs import Computed, sliding_contact
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty
 from seal_friction_ros.offline.reports import figure_style as style
-from seal_friction_ros.offline.reports.figure_style import Plot, house_style
+from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, number, pressure_text
-from seal_friction_ros.offline.reports.page import Table, head_of, write_page
+from seal_friction_ros.offline.reports.page import Columns, Table, head_of, table_of, write_page
 from seal_friction_ros.offline.reports.thesis_data import THESIS_SEAL, ThesisContact, appendix_b
 from seal_friction_ros.offline.reports.uncertainty_tables import uncertainty_values
 
@@ -39,18 +39,12 @@ def thesis_case(computed: Computed, result: OringResult) -> ThesisContact | None
 def numbers_text(computed: Computed) -> str:
     """The numbers of a case, for a terminal."""
     summary = computed.summary
-    columns = (
-        summary.pressure_Pa,
-        summary.normal_force_N,
-        summary.axial_force_N,
-        summary.peak_contact_stress_Pa,
-        summary.contact_width_m,
-    )
     lines = [f'{summary.case}: on the {summary.sliding_wall}']
     lines += [
-        f'  {pressure / BAR:8.2f} bar: normal force {normal:8.2f} N, axial force {axial:8.2f} N, '
-        f'peak contact stress {peak / MPA:6.3f} MPa, contact width {width / MM:5.3f} mm'
-        for pressure, normal, axial, peak, width in zip(*columns, strict=True)
+        f'  {one.pressure / BAR:8.2f} bar: normal force {wall.force:8.2f} N, axial force {one.axial_force:8.2f} N, '
+        f'peak contact stress {wall.peak_stress / MPA:6.3f} MPa, contact width {wall.width / MM:5.3f} mm'
+        for one in computed.results
+        for wall in [sliding_contact(computed.file.case, one)]
     ]
     if summary.area_deformation_gain is not None and summary.radial_force_N is not None:
         lines.append(
@@ -67,9 +61,8 @@ def _friction_text(computed: Computed, frictions: Sequence[float]) -> str:
     summary = computed.summary
     text = f'  friction of one seal {", ".join(f"{friction:.3g}" for friction in frictions)} N'
     if summary.shear_stress_Pa is not None:
-        text += (
-            f', shear stress at 1 MPa {summary.shear_stress_Pa / MPA:.3g} MPa, exponent {summary.shear_exponent:.3g}'
-        )
+        stress = f'shear stress at 1 MPa {summary.shear_stress_Pa / MPA:.3g} MPa'
+        text += f', {stress}, exponent {summary.shear_exponent:.3g}'
     text += f', relative_std {summary.friction_relative_std:.2g}'
     if computed.readings:
         largest = max(map(abs, summary.reading_deviations))
@@ -79,14 +72,7 @@ def _friction_text(computed: Computed, frictions: Sequence[float]) -> str:
 
 @house_style()
 def write_oring_report(computed: Computed, out: Path, uncertainty: Uncertainty | None = None) -> tuple[Path, ...]:
-    """Write the report of a computed case, with the ``uncertainty`` of its force from samples; see `write_page`.
-
-    Returns:
-        Paths of the figures.
-
-    Raises:
-        ValueError: The page or a figure cannot be written.
-    """
+    """Write the report of a computed case, with the ``uncertainty`` of its force from samples; see `write_page`."""
     case = computed.file.case
     return write_page(
         out,
@@ -109,9 +95,8 @@ def write_oring_report(computed: Computed, out: Path, uncertainty: Uncertainty |
 
 def _verdict(computed: Computed) -> Verdict:
     """By the largest deviation of the axial force from pressure times area, and the largest loss of volume [-]."""
-    area, summary = projected_area(computed.file.case.geometry), computed.summary
-    loaded = [result for result in computed.results if result.pressure]
-    balance = max((abs(result.axial_force / (result.pressure * area) - 1.0) for result in loaded), default=0.0)
+    summary = computed.summary
+    balance = max((abs(_unbalanced(computed, result) or 0.0) for result in computed.results), default=0.0)
     lost = max(abs(1.0 - result.volume_ratio) for result in computed.results)
     pairs = zip(summary.normal_force_N, summary.pressure_Pa, strict=True)
     first, *others = (f'{force:.3g} N at {pressure / BAR:.3g} bar' for force, pressure in pairs)
@@ -128,34 +113,30 @@ def _verdict(computed: Computed) -> Verdict:
 # -- tables -----------------------------------------------------------------------------------------------------------
 
 
-def _number_table(computed: Computed) -> Table:
+def _unbalanced(computed: Computed, result: OringResult) -> float | None:
+    """Axial force over pressure times area, less 1; None without pressure."""
     area = projected_area(computed.file.case.geometry)
-    heads = (
-        'pressure [bar]', '[psi]', 'normal force [N]', 'all wall stress [N]', 'other wall [N]', 'axial force [N]',
-        'off pressure times area [%]', 'peak contact stress [MPa]', 'contact width [mm]', 'volume lost [%]',
-        'Newton steps',
-    )  # fmt: skip
-    rows = []
-    for result in computed.results:
-        contact = sliding_contact(computed.file.case, result)
-        other = result.gland if contact is result.rod else result.rod
-        off = 100.0 * (result.axial_force / (result.pressure * area) - 1.0) if result.pressure else None
-        rows.append(
-            (
-                number(result.pressure / BAR),
-                number(result.pressure / PSI, 0),
-                number(contact.force),
-                number(contact.wall_force),
-                number(other.force),
-                number(result.axial_force),
-                number(off, 3, signed=True),
-                number(contact.peak_stress / MPA, 3),
-                number(contact.width / MM, 3),
-                number(100.0 * (1.0 - result.volume_ratio), 3),
-                result.newton_steps,
-            )
-        )
-    return Table(heads, rows)
+    return result.axial_force / (result.pressure * area) - 1.0 if result.pressure else None
+
+
+def _number_table(computed: Computed) -> Table:
+    def slides(result: OringResult) -> WallContact:
+        return sliding_contact(computed.file.case, result)
+
+    columns: Columns = (
+        ('pressure [bar]', lambda one: number(one.pressure, unit=BAR)),
+        ('[psi]', lambda one: number(one.pressure, 0, unit=PSI)),
+        ('normal force [N]', lambda one: number(slides(one).force)),
+        ('all wall stress [N]', lambda one: number(slides(one).wall_force)),
+        ('other wall [N]', lambda one: number((one.gland if slides(one) is one.rod else one.rod).force)),
+        ('axial force [N]', lambda one: number(one.axial_force)),
+        ('off pressure times area [%]', lambda one: number(_unbalanced(computed, one), 3, unit=0.01, signed=True)),
+        ('peak contact stress [MPa]', lambda one: number(slides(one).peak_stress, 3, unit=MPA)),
+        ('contact width [mm]', lambda one: number(slides(one).width, 3, unit=MM)),
+        ('volume lost [%]', lambda one: number(1.0 - one.volume_ratio, 3, unit=0.01)),
+        ('Newton steps', lambda one: one.newton_steps),
+    )
+    return table_of(computed.results, columns)
 
 
 def _thesis_table(computed: Computed) -> Table:
@@ -186,20 +167,14 @@ def _friction_table(computed: Computed) -> Table:
     measured = computed.file.measured
     if measured is None or not computed.summary.friction_N:
         return Table(heads, ())
-    rows = []
-    off = friction_deviation(computed, measured)
-    for pressure, friction, share in zip(measured.pressures, measured.frictions, off.tolist(), strict=True):
-        each = friction / measured.seals
-        own = each * (1.0 + share / 100.0)
-        rows.append((number(pressure / BAR), number(each), number(own), number(share, 1, signed=True)))
-    return Table(heads, rows)
+    each, off = np.array(measured.frictions) / measured.seals, friction_deviation(computed, measured)
+    columns = (measured.pressures, each.tolist(), (each * (1.0 + off / 100.0)).tolist(), off.tolist())
+    rows = zip(*columns, strict=True)
+    return Table(heads, [(number(p / BAR), number(m), number(own), number(o, 1, signed=True)) for p, m, own, o in rows])
 
 
 def geometry_friction(computed: Computed, pressures: FloatArray) -> FloatArray:
-    """Sliding friction of one seal [N] at pressures [Pa, gauge], shape (n,); NaN outside the computed pressures.
-
-    Between them the law of the seal file interpolates.
-    """
+    """Sliding friction of one seal [N] at pressures [Pa, gauge], shape (n,); NaN outside the computed ones."""
     summary, law = computed.summary, computed.friction_law
     if summary.friction_N is None:
         return np.full(len(pressures), np.nan)
@@ -301,15 +276,11 @@ def walls_figure(computed: Computed) -> Plot:
             if len(contact.position):
                 position, stress = _closed_profile(contact)
                 ax.plot((contact.edges[0] + position) / MM, stress / MPA, **look)
-    inner, outer = (
-        ('rod', 'gland')
-        if computed.file.case.geometry.sliding_wall == 'rod'
-        else ('groove (inner wall)', 'bore (outer wall)')
-    )
-    for ax, name, along in zip(
-        axes, (inner, outer, 'downstream wall'), ('axial position',) * 2 + ('radius',), strict=True
-    ):
-        ax.set(title=name, xlabel=f'{along} [mm]', ylim=(0.0, None))
+    is_rod = computed.file.case.geometry.sliding_wall == 'rod'
+    names = ('rod', 'gland') if is_rod else ('groove (inner wall)', 'bore (outer wall)')
+    for ax, name in zip(axes, (*names, 'downstream wall'), strict=True):
+        ax.set(title=name, xlabel='axial position [mm]', ylim=(0.0, None))
+    axes[2].set_xlabel('radius [mm]')
     axes[0].set_ylabel('contact stress [MPa]')
     style.legend_below(figure, axes[0], len(results))
     return Plot('contact_stress_walls', figure)
@@ -331,9 +302,8 @@ def axial_force_figure(computed: Computed) -> Plot:
     if thesis:
         x, y = np.array(thesis).T
         ax.plot(x / size, y / size, 's', ms=6.0, mfc='none', color=style.BLACK, label='thesis (Appendix B)')
-    ax.set(ylim=(0.0, None), xlabel=f'axial force [{unit}]', ylabel=f'normal force [{unit}]')
-    style.legend_above(ax)
-    return Plot('normal_over_axial_force', figure)
+    labels = {'xlabel': f'axial force [{unit}]', 'ylabel': f'normal force [{unit}]'}
+    return finished('normal_over_axial_force', figure, ax, ylim=(0.0, None), **labels)
 
 
 def geometry_friction_figure(computed: Computed) -> Plot:
@@ -341,11 +311,9 @@ def geometry_friction_figure(computed: Computed) -> Plot:
     summary, measured = computed.summary, computed.file.measured
     pressure, friction = np.array(summary.pressure_Pa), np.array(summary.friction_N or ())
     title = 'Friction from geometry'
-    if measured:
-        off = friction_deviation(computed, measured)
-        off = off[np.isfinite(off)]
-        if len(off):
-            title += f': {off.min():+.0f} to {off.max():+.0f} % off the measured friction'
+    off = friction_deviation(computed, measured) if measured else np.zeros(0)
+    if np.isfinite(off).any():
+        title += f': {np.nanmin(off):+.0f} to {np.nanmax(off):+.0f} % off the measured friction'
     figure, ax = style.new_figure(title, 3.8)
     between = np.linspace(pressure[0], pressure[-1], 201)
     ax.plot(between / BAR, geometry_friction(computed, between), color=style.BLUE)
@@ -353,6 +321,5 @@ def geometry_friction_figure(computed: Computed) -> Plot:
     if measured:
         each = np.array(measured.frictions) / measured.seals
         ax.plot(np.array(measured.pressures) / BAR, each, 's', color=style.BLACK, ms=5.5, label='measured')
-    ax.set(ylim=(0.0, None), xlabel='pressure [bar, gauge]', ylabel='sliding friction of one seal [N]')
-    style.legend_above(ax)
-    return Plot('friction', figure)
+    labels = {'xlabel': 'pressure [bar, gauge]', 'ylabel': 'sliding friction of one seal [N]'}
+    return finished('friction', figure, ax, ylim=(0.0, None), **labels)

@@ -8,7 +8,6 @@ input gives the same bytes.
 
 from base64 import b64encode
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,6 +15,7 @@ from typing import Any, NamedTuple
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup
 
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.parameters import meanings
 from seal_friction_ros.core.foundation.units import BAR, MM, MPA, MS, PSI, UM
@@ -67,8 +67,7 @@ def table_of(records: Iterable[Any], columns: Columns, text_columns: Sequence[in
     return Table(heads, [[cell(record) for cell in cells] for record in records], text_columns)
 
 
-@dataclass(frozen=True)
-class ReportSummary:
+class ReportSummary(NamedTuple):
     """Files of a report, and its numbers."""
 
     page: Path
@@ -99,14 +98,8 @@ def _shown(value: Any) -> Any:
 @cache
 def environment() -> Environment:
     """Template engine of the reports."""
-    made = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+    white: dict[str, Any] = dict.fromkeys(('trim_blocks', 'lstrip_blocks', 'keep_trailing_newline'), True)
+    made = Environment(loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, **white)
     made.globals |= {'BAND_95': f'{BAND_95:.2f}', 'BAR': BAR, 'MM': MM, 'MPA': MPA, 'MS': MS, 'PSI': PSI, 'UM': UM}
     made.globals |= {f.__name__: f for f in (length_text, number, pressure_range, pressure_text, thousands)}
     return made
@@ -121,16 +114,10 @@ def template_of(template: str | Path) -> Template:
 
 
 def render_page(template: str | Path, pictures: dict[str, bytes], plots: dict[str, Any], **values: Any) -> str:
-    """HTML of a page.
+    """HTML of a page; arguments as of `template_of` and `write_page`.
 
-    Args:
-        template: As of `template_of`.
-        pictures: Name of a figure -> SVG; a figure that is named in the template but missing here is left out.
-        plots: Name of a figure -> its data, see `plot_data`; None: the picture alone.
-        values: What the template shows.
-
-    Raises:
-        jinja2.UndefinedError: The template names a value that is not in ``values``.
+    ``pictures`` are SVG by name of the figure, which the template leaves out if it is missing; ``plots`` their
+    `plot_data`. jinja2.UndefinedError: the template names a value that is not in ``values``.
     """
     encoded = {name: b64encode(svg).decode() for name, svg in pictures.items()}
     shared = {'script': script, 'version': package_version(), 'MOST_OPEN': MOST_OPEN}
@@ -151,28 +138,22 @@ def write_page(
 
     Args:
         out: HTML file.
-        template: As of `render_page`.
+        template: As of `template_of`.
         plots: The figures.
         warnings: Remarks below the verdict, the most important first; those after `MOST_OPEN` are folded.
-        values: As of `render_page`; ``verdict`` and ``head`` among them, unless the template is a form.
+        values: What the template shows; ``verdict`` and ``head`` among them, unless it is a form.
 
-    Returns:
-        Paths of the figures.
-
-    Raises:
-        ValueError: A file cannot be written.
+    Returns the paths of the figures. ValueError: a file cannot be written.
     """
     show_status('figures ...')
-    drawn = [(plot.name, render(plot.figure), plot_data(plot.figure)) for plot in plots]
-    rendered, data = {name: kinds for name, kinds, _ in drawn}, {name: content for name, _, content in drawn}
+    rendered, data = {}, {}
+    for name, figure in plots:
+        rendered[name], data[name] = render(figure), plot_data(figure)  # in this order: rendering fixes the layout
     pictures = {name: kinds['svg'] for name, kinds in rendered.items()}
     page = render_page(template, pictures, data, warnings=list(warnings), **values)
     folder = out.parent / f'{out.stem}_figures'
     files = {folder / f'{name}.{kind}': data for name, kinds in rendered.items() for kind, data in kinds.items()}
-    try:
-        (folder if files else out.parent).mkdir(parents=True, exist_ok=True)
+    with named_errors(f'{out}: cannot write the page or its figures', OSError):
         for path, content in {**files, out: page.encode('utf-8', 'replace')}.items():
             write_whole(path, content)
-    except OSError as error:
-        raise ValueError(f'{out}: cannot write the page or its figures: {error.strerror or error}') from None
     return tuple(files)

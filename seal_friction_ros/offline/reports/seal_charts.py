@@ -91,12 +91,7 @@ def charted_seal(seal: Seal) -> ChartedSeal:
 def write_seal_charts(seal: Path, out: Path) -> ReportSummary:
     """Write the charts of a seal file; see `write_page`. The numbers are the friction of all seals at some pressures.
 
-    Args:
-        seal: Seal file.
-        out: HTML file.
-
-    Raises:
-        ValueError: The seal file cannot be read or is invalid, or the page cannot be written.
+    ValueError: the seal file cannot be read or is invalid, or the page cannot be written.
     """
     try:
         shown = charted_seal(parse_seal(document := read_yaml(seal)))
@@ -134,18 +129,14 @@ def _verdict(shown: ChartedSeal) -> Verdict:
     name, pressure = shown.seal.name, shown.seal.pressure_max
     if name == PLACEHOLDER:
         return Verdict(BAD, 'Placeholder: its numbers are those of another seal.', f'{NAME_SEALS}.')
-    pairs = zip(*_compared(shown), strict=False)
-    off = [abs(shown.friction(p).coulomb_friction / mean - 1.0) for p, mean in pairs]
-    tested = f', within {percent(max(off))} of the mean of the tests' if off else ''
+    tested = f', within {percent(max(off))} of the mean of the tests' if (off := _off(shown)) else ''
     at_most = shown.friction(pressure)
     friction, std = at_most.coulomb_friction, at_most.coulomb_friction_std / at_most.coulomb_friction
-    text = (
-        f'{friction:.3g} N of Coulomb friction at {pressure / BAR:.3g} bar, standard deviation {percent(std)}{tested}.'
-    )
+    where = f'{friction:.3g} N of Coulomb friction at {pressure / BAR:.3g} bar'
+    level, after = GOOD, f'use it: seals: [{name}].'
     if std > verdicts.WIDE_BAND:
-        after = 'the band is wide: fit it to readings of your machine (docs/identification.md).'
-        return Verdict(LOOK, text, after)
-    return Verdict(GOOD, text, f'use it: seals: [{name}].')
+        level, after = LOOK, 'the band is wide: fit it to readings of your machine (docs/identification.md).'
+    return Verdict(level, f'{where}, standard deviation {percent(std)}{tested}.', after)
 
 
 # -- the data under the figures ---------------------------------------------------------------------------------------
@@ -177,6 +168,12 @@ def _compared(shown: ChartedSeal) -> tuple[tuple[float, ...], tuple[float, ...]]
         return tuple(np.linspace(shown.seal.pressure_min, shown.seal.pressure_max, 11).tolist()), ()
     levels, means = mean_dynamic_friction()
     return tuple(levels.tolist()), tuple(means.tolist())
+
+
+def _off(shown: ChartedSeal) -> list[float]:
+    """Deviation of the Coulomb friction from each mean of the tests, if there are some [-]."""
+    pairs = zip(*_compared(shown), strict=False)
+    return [abs(shown.friction(pressure).coulomb_friction / mean - 1.0) for pressure, mean in pairs]
 
 
 def _friction_table(shown: ChartedSeal) -> Table:
@@ -248,13 +245,9 @@ def seal_model_figure(shown: ChartedSeal) -> Plot:
     values = np.array([(f.coulomb_friction, f.coulomb_friction_std, f.stiction) for f in frictions])
     coulomb, std, stiction = values.T
     unit, size = force_unit(float(coulomb[-1]))
-    compared, measured = _compared(shown)
-    if measured:
-        of_law = np.array([shown.friction(p).coulomb_friction for p in compared])
-        off = np.abs(100.0 * (of_law / measured - 1.0))
-        title = f'Model and mean of the tests differ by {off.min():.1f} to {off.max():.1f} %'
-    else:
-        title = f'Coulomb friction reaches {coulomb[-1]:.3g} N at {pressures[-1] / BAR:.3g} bar'
+    title = f'Coulomb friction reaches {coulomb[-1]:.3g} N at {pressures[-1] / BAR:.3g} bar'
+    if off := _off(shown):
+        title = f'Model and mean of the tests differ by {100.0 * min(off):.1f} to {100.0 * max(off):.1f} %'
     figure, ax = style.new_figure(title, 4.4)
     style.fill_band(ax, pressures / BAR, coulomb / size, BAND_95 * std / size, label=f'95 % band (± {BAND_95:.2f} std)')
     ax.plot(pressures / BAR, coulomb / size, color=style.BLUE, lw=1.8, label='Coulomb friction, model')

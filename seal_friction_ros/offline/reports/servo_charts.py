@@ -18,19 +18,10 @@ from seal_friction_ros.core.servo.position_servo import ServoParameters, Traject
 from seal_friction_ros.core.servo.tracking import dwell_per_reversal, tracking_peak, tracking_rms
 from seal_friction_ros.files import load_seals
 from seal_friction_ros.offline.reports import figure_style as style
+from seal_friction_ros.offline.reports import page
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, length_text, length_unit, number
-from seal_friction_ros.offline.reports.page import (
-    PARAMETER_HEADS,
-    Columns,
-    ReportSummary,
-    Table,
-    head_of,
-    parameter_rows,
-    seals_text,
-    table_of,
-    write_page,
-)
+from seal_friction_ros.offline.reports.page import ReportSummary
 
 CHART_PERIODS = 6  # of the reference, evaluated after `SETTLING_PERIODS`
 SHOWN_PERIODS = 2  # in the figures
@@ -56,11 +47,6 @@ class FollowedWave(NamedTuple):
     tracking: ServoTracking
 
 
-def default_servo() -> ServoParameters:
-    """The servo of the simulator with its default seals."""
-    return ServoParameters(seals=load_seals(SealSelection()))
-
-
 def follow_wave(parameters: ServoParameters, wave: Sine) -> FollowedWave:
     """Simulate a servo that follows a wave from rest, and evaluate it after `SETTLING_PERIODS`."""
     period = 1.0 / wave.frequency
@@ -80,26 +66,21 @@ def follow_wave(parameters: ServoParameters, wave: Sine) -> FollowedWave:
 
 @house_style()
 def write_servo_charts(out: Path, parameters: ServoParameters | None = None, wave: Sine | None = None) -> ReportSummary:
-    """Write the charts of a servo; see `write_page`.
+    """Write the charts of a servo that follows a wave, by default those of the simulator; see `page.write_page`.
 
-    Args:
-        out: HTML file.
-        parameters: The servo with its seals; default: that of the simulator.
-        wave: The reference; default: that of the simulator.
-
-    Raises:
-        ValueError: The servo has no seals, or the page cannot be written.
+    ValueError: the servo has no seals, or the page cannot be written.
     """
-    servo, wave = parameters or default_servo(), wave or Sine()
+    servo, wave = parameters or ServoParameters(seals=load_seals(SealSelection())), wave or Sine()
     if not servo.seals:
         raise ValueError('the servo has no seals, so no friction to show')
+    names = [one.seal.name for one in servo.seals]
     rubbing, free = follow_wave(servo, wave), follow_wave(replace(servo, seals=()), wave)
-    figures = write_page(
+    figures = page.write_page(
         out,
         'servo',
         [figure_25(rubbing, free, wave), forces_figure(rubbing, wave)],
         verdict=_verdict(rubbing.tracking, free.tracking),
-        head=head_of('servo', 'simulated, no measured data', seals_text([one.seal.name for one in servo.seals])),
+        head=page.head_of('servo', 'simulated, no measured data', page.seals_text(names)),
         wave=wave,
         seals=len(servo.seals),
         rubbing=rubbing.tracking,
@@ -126,8 +107,8 @@ def _verdict(rubbing: ServoTracking, free: ServoTracking) -> Verdict:
     return Verdict(level, text, 'compensate it: seal_friction tune --out feedforward.yaml.')
 
 
-def _tracking_table(rubbing: ServoTracking, free: ServoTracking) -> Table:
-    columns: Columns = (
+def _tracking_table(rubbing: ServoTracking, free: ServoTracking) -> page.Table:
+    columns: page.Columns = (
         ('', lambda t: 'with friction' if t is rubbing else 'without friction'),
         ('RMS error [µm]', lambda t: number(t.rms, 1, unit=UM)),
         ('peak error [µm]', lambda t: number(t.peak, 1, unit=UM)),
@@ -135,14 +116,14 @@ def _tracking_table(rubbing: ServoTracking, free: ServoTracking) -> Table:
         ('rest per reversal [ms]', lambda t: number(t.dwell, 1, unit=MS)),
         ('[% of a period]', lambda t: number(t.dwell_share, 1, unit=0.01)),
     )
-    return table_of((rubbing, free), columns, (0,))
+    return page.table_of((rubbing, free), columns, (0,))
 
 
-def _parameter_table(parameters: ServoParameters, wave: Sine) -> Table:
-    rows = parameter_rows(wave, 'reference.')
+def _parameter_table(parameters: ServoParameters, wave: Sine) -> page.Table:
+    rows = page.parameter_rows(wave, 'reference.')
     for name in ('valve', 'cylinder', 'load', 'controller'):
-        rows += parameter_rows(getattr(parameters, name), f'{name}.')
-    return Table(PARAMETER_HEADS, rows + parameter_rows(parameters), (0, 2, 3))
+        rows += page.parameter_rows(getattr(parameters, name), f'{name}.')
+    return page.Table(page.PARAMETER_HEADS, rows + page.parameter_rows(parameters), (0, 2, 3))
 
 
 # -- figures ----------------------------------------------------------------------------------------------------------

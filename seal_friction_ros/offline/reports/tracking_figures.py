@@ -18,13 +18,6 @@ PERIODS = 3  # that are shown
 SHOWN_TIME = 1.0  # [s] of a reference that is not periodic
 
 
-_WITH_OR_WITHOUT = {
-    True: ' with feed-forward',
-    False: ' without feed-forward',
-    None: '; feed-forward that acted: not known',
-}
-
-
 def tracking_plots(run: RecordedRun, evaluation: TrackingEvaluation) -> list[Plot]:
     """Every figure of the tracking that the bag has the data for."""
     known = [stretch for stretch in (evaluation.without, evaluation.compensated) if stretch is not None]
@@ -43,7 +36,7 @@ def tracking_summary(evaluation: TrackingEvaluation) -> str:
         alone = compensated or without or evaluation.unknown
         if alone is None:
             return 'No stretch is long enough to evaluate the tracking'
-        return f'Tracking error {length_text(alone.rms)} RMS{_WITH_OR_WITHOUT[alone.has_feedforward]}'
+        return f'Tracking error {length_text(alone.rms)} RMS, {stretch_name(alone)}'
     verb, before, after = 'cuts' if compensated.rms_change < 0.0 else 'raises', without.rms, compensated.rms
     return f'Feed-forward {verb} the tracking error from {length_text(before)} to {length_text(after)} RMS'
 

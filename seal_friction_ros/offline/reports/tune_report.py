@@ -33,7 +33,6 @@ _REFERENCE: dict[str, Any] = {'color': style.GREY, 'lw': 2.2, 'alpha': 0.6, 'lab
 def write_tuning_page(tuning: SimulatorTuning | BagTuning, out: Path) -> tuple[Path, ...]:
     """Write the page of a tuning; result and errors as of `write_page`."""
     found = tuning.found
-    tables = {'parameter_table': _parameter_table(tuning), 'case_table': _case_table(tuning)}
     law = None if isinstance(tuning, SimulatorTuning) else tuning.found.law
     verdict = verdicts.of_tuning(
         tuning.result,
@@ -43,34 +42,30 @@ def write_tuning_page(tuning: SimulatorTuning | BagTuning, out: Path) -> tuple[P
         fitted=law is not None and law.mass_is_fitted,
     )
     source = 'simulated servo, no measured data' if law is None else tuning.task.source
-    head = head_of('tune', source, tuning.task.seals)
     shared: dict[str, Any] = {
         'verdict': verdict,
         'warnings': tuning.remarks if tuning.result in verdict.text else (tuning.result, *tuning.remarks),
-        'head': head,
+        'head': head_of('tune', source, tuning.task.seals),
         'tuning': tuning,
         'found': found,
-        'was': found.without,
-        'now': found.nominal,
-        **tables,
+        'parameter_table': _parameter_table(tuning),
+        'case_table': _case_table(tuning),
     }
     if isinstance(tuning, SimulatorTuning):
         outcomes = [case.outcome for case in tuning.found.cases]
-        special: dict[str, Any] = {
+        shared |= {
             'worst': {name: max(getattr(o, name) for o in outcomes) for name in ('tracking_rms', 'overshoot')},
             'reversals': sum(o.limit_cycle_reversals for o in outcomes),
-            'settings': tuning.problem.settings,
-            'whole_delay': tuning.problem.whole_delay,
             'loop': closed_loop,
         }
-        return write_page(out, 'simulator_tuning', tuning_figures(tuning), **shared, **special)
-    special = {
+        return write_page(out, 'simulator_tuning', tuning_figures(tuning), **shared)
+    shared |= {
         'recorded': tuning.track.numbers(),
         'sliding_samples': int(np.count_nonzero(tuning.found.law.sliding)),
         'offset_is_known': bool(np.isfinite(tuning.found.law.offset)),
         'NEAR_REVERSAL': NEAR_REVERSAL,
     }
-    return write_page(out, 'bag_tuning', recorded_axis_figures(tuning), **shared, **special)
+    return write_page(out, 'bag_tuning', recorded_axis_figures(tuning), **shared)
 
 
 # -- tables -----------------------------------------------------------------------------------------------------------

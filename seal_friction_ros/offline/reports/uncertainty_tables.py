@@ -9,7 +9,7 @@ from seal_friction_ros.core.foundation.units import BAR, MM
 from seal_friction_ros.core.foundation.unknowns import Unknown
 from seal_friction_ros.offline.contact.uncertainty import QUANTILES, Uncertainty
 from seal_friction_ros.offline.reports.formatting import number
-from seal_friction_ros.offline.reports.page import Table
+from seal_friction_ros.offline.reports.page import Columns, Table, table_of
 
 
 def uncertainty_values(uncertainty: Uncertainty | None, unknowns: Sequence[Unknown]) -> dict[str, Any]:
@@ -20,9 +20,7 @@ def uncertainty_values(uncertainty: Uncertainty | None, unknowns: Sequence[Unkno
         'uncertainty': uncertainty,
         'quantile_table': _quantile_table(uncertainty),
         'unknown_table': _unknown_table(uncertainty, unknowns),
-        'failed_table': Table(
-            ('sample', 'reason'), [(i + 1, reason) for i, reason in uncertainty.failed.items()], (1,)
-        ),
+        'failed_table': Table(('sample', 'reason'), [(i + 1, why) for i, why in uncertainty.failed.items()], (1,)),
     }
 
 
@@ -35,23 +33,23 @@ def _quantile_table(uncertainty: Uncertainty) -> Table:
         *(f'{100.0 * share:g} % [N]' for share in QUANTILES),
         'relative standard deviation [%]',
     ]
-    columns = [uncertainty.nominal, *uncertainty.quantiles, 100.0 * uncertainty.relative_stds]
+    columns = [uncertainty.nominal, *uncertainty.quantiles]
     rows = []
     for place in np.ndindex(*uncertainty.nominal.shape):
         axes = [number(uncertainty.pressures[place[0]] / BAR)]
         axes += [number(uncertainty.speeds[place[1]] / MM)] if uncertainty.speeds else []
-        rows.append(
-            (*axes, *(number(float(column[place]), 3) for column in columns[:-1]), number(columns[-1][place], 0))
-        )
+        forces = [number(float(column[place]), 3) for column in columns]
+        rows.append((*axes, *forces, number(float(uncertainty.relative_stds[place]), 0, unit=0.01)))
     return Table(heads, rows)
 
 
 def _unknown_table(uncertainty: Uncertainty, unknowns: Sequence[Unknown]) -> Table:
     """Row for each unknown."""
-    spread = {unknown.name: unknown for unknown in unknowns}
-    rows = []
-    for name, correlation in uncertainty.rank_correlations.items():
-        one = spread[name]
-        amounts = ' to '.join(f'{amount:.6g}' for amount in one.amounts)
-        rows.append((name, f'{one.value:.6g}', f'{one.kind} {amounts}', number(correlation, 2, signed=True)))
-    return Table(('unknown', 'in the case', 'spread', 'rank correlation with the force'), rows, (0, 2))
+    correlations, by_name = uncertainty.rank_correlations, {unknown.name: unknown for unknown in unknowns}
+    columns: Columns = (
+        ('unknown', lambda one: one.name),
+        ('in the case', lambda one: f'{one.value:.6g}'),
+        ('spread', lambda one: f'{one.kind} ' + ' to '.join(f'{amount:.6g}' for amount in one.amounts)),
+        ('rank correlation with the force', lambda one: number(correlations[one.name], 2, signed=True)),
+    )
+    return table_of([by_name[name] for name in correlations], columns, (0, 2))

@@ -37,14 +37,10 @@ class Cluster:
     """A Dask cluster.
 
     ValueError: the address is none, or TLS is for one of both only.
-
-    Args:
-        address: Of its scheduler, ``tcp://HOST:PORT`` or, with TLS, ``tls://HOST:PORT``.
-        tls: Files in PEM: certificate of the authority, own certificate, own key; None without TLS.
     """
 
-    address: str
-    tls: tuple[Path, Path, Path] | None = None
+    address: str  # of its scheduler, ``tcp://HOST:PORT`` or, with TLS, ``tls://HOST:PORT``
+    tls: tuple[Path, Path, Path] | None = None  # certificate of the authority, own certificate, own key, in PEM
 
     def __post_init__(self) -> None:
         match = _ADDRESS.fullmatch(self.address)
@@ -135,13 +131,11 @@ _GONE = (
 def completed_on(
     cluster: Cluster, calls: Sequence[Callable[[], Any]], *, stop_at_error: bool
 ) -> Iterator[tuple[int, Outcome[Any]]]:
-    """Number and outcome of each call as it is done.
+    """Number and outcome of each call as it is done; arguments as of `executor.try_all`.
 
-    At most a few calls for each worker are under way, so that memory does not grow with the number of calls. A worker
-    that ends amid a call costs time: another one repeats the call. A call that ends several workers has crashed. Calls
-    are as of `executor.try_all`, and importable by name on the workers; with ``stop_at_error`` no call begins after an
-    error, and those after it are left out. MissingPackageError: Dask is not installed; ValueError: the cluster cannot
-    be used, or not any more; one line.
+    At most a few calls for each worker are under way, so that memory does not grow with the number of calls. Of a
+    worker that ends another one repeats the call; a call that ends several workers has crashed. Workers import calls by
+    name. MissingPackageError: Dask is not installed; ValueError: the cluster cannot be used, or not any more.
     """
     with _connected(cluster) as client:
         most = _CALLS_OF_A_WORKER * _checked_workers(client)

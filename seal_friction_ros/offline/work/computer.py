@@ -7,7 +7,6 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
-from enum import Enum
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
@@ -23,18 +22,14 @@ SMALLEST_SHARED_MEMORY = 64 << 20  # [bytes] of /dev/shm for a few nodes (our ch
 SHARED_MEMORY = Path('/dev/shm')  # noqa: S108  looked at, never written
 
 
-class Level(Enum):
-    """Weight of a finding."""
-
-    OK = 'ok'
-    NOTE = 'note'  # something works less well, or some command does not
-    FAULT = 'fault'  # a node cannot run, or nodes do not find each other
+OK, NOTE, FAULT = 'ok', 'note', 'fault'
+"""levels; note: something works less well, or some command does not; fault: a node cannot run, or is not found"""
 
 
 class Finding(NamedTuple):
     """One line about this computer."""
 
-    level: Level
+    level: str
     subject: str
     text: str
 
@@ -53,12 +48,12 @@ def findings(environment: Mapping[str, str] = os.environ, udp: Path = Path('/pro
 
 def _versions() -> Iterator[Finding]:
     own = version_of('seal_friction_ros', 'not installed: run make setup, or source the colcon workspace')
-    yield Finding(Level.OK, 'versions', f'seal_friction_ros {own}, Python {platform.python_version()}')
+    yield Finding(OK, 'versions', f'seal_friction_ros {own}, Python {platform.python_version()}')
     for module in OPTIONAL:
         if find_spec(module):
-            yield Finding(Level.OK, module, version_of(module, 'version unknown'))
+            yield Finding(OK, module, version_of(module, 'version unknown'))
         else:
-            yield Finding(Level.NOTE, module, how_to_install(module))
+            yield Finding(NOTE, module, how_to_install(module))
 
 
 def _ros(environment: Mapping[str, str]) -> Iterator[Finding]:
@@ -69,7 +64,7 @@ def _ros(environment: Mapping[str, str]) -> Iterator[Finding]:
     ):
         found = find_spec(module) is not None
         text = f'from {distribution or "wheels"}' if found else f'not installed: no node can run: {hint}'
-        yield Finding(Level.OK if found else Level.FAULT, module, text)
+        yield Finding(OK if found else FAULT, module, text)
 
 
 def _middleware(environment: Mapping[str, str]) -> Iterator[Finding]:
@@ -77,17 +72,17 @@ def _middleware(environment: Mapping[str, str]) -> Iterator[Finding]:
     for name, path in given:
         there = Path(path).is_file()
         text = f'{path} ({name})' + ('' if there else ': no such file, so the defaults of Fast DDS act')
-        yield Finding(Level.OK if there else Level.FAULT, 'profile', text)
+        yield Finding(OK if there else FAULT, 'profile', text)
     if not given:
         own = 'config/fastdds.xml, set by the nodes'
         without = f'none: nodes may find each other 3 s late; export {PROFILES[0]}=.../config/fastdds.xml'
         is_own = _has_own_profile(environment)
-        yield Finding(Level.OK if is_own else Level.NOTE, 'profile', own if is_own else without)
+        yield Finding(OK if is_own else NOTE, 'profile', own if is_own else without)
     default = 'SUBNET' if 'ROS_DISTRO' in environment else 'LOCALHOST'
     reach = environment.get('ROS_AUTOMATIC_DISCOVERY_RANGE', default)
     where = {'LOCALHOST': 'nodes of this computer', 'OFF': 'no other node', 'SUBNET': 'every computer of the network'}
     text = f'{reach}: {where.get(reach, "not a range: use SUBNET, LOCALHOST, OFF or SYSTEM_DEFAULT")}'
-    level = Level.OK if reach in (*where, 'SYSTEM_DEFAULT') else Level.FAULT
+    level = OK if reach in (*where, 'SYSTEM_DEFAULT') else FAULT
     yield Finding(level, 'discovery range', f'{text}; domain {_domain(environment)}')
 
 
@@ -109,27 +104,27 @@ def _participants(environment: Mapping[str, str], udp: Path) -> Finding:
     try:
         used = {int(port, 16) for port in re.findall(r'^ *\d+: [0-9A-F]+:([0-9A-F]{4})', udp.read_text(), re.MULTILINE)}
     except OSError as error:
-        return Finding(Level.NOTE, 'participants', f'not known: {error.strerror}')
+        return Finding(NOTE, 'participants', f'not known: {error.strerror}')
     numbers = [number for number, port in enumerate(ports) if port in used]
     most = _ANNOUNCED_TO['profile' if _has_own_profile(environment) else 'rclpy']
     if max(numbers, default=0) >= most:
         text = f'{len(numbers)}, the highest has number {max(numbers)}: nodes from number {most} on are not discovered'
-        return Finding(Level.FAULT, 'participants', f'{text}: stop some, or use another ROS_DOMAIN_ID')
-    return Finding(Level.OK, 'participants', f'{len(numbers)} of at most {most}')
+        return Finding(FAULT, 'participants', f'{text}: stop some, or use another ROS_DOMAIN_ID')
+    return Finding(OK, 'participants', f'{len(numbers)} of at most {most}')
 
 
 def _shared_memory(environment: Mapping[str, str]) -> Finding:
     if _has_own_profile(environment):
-        return Finding(Level.OK, 'shared memory', 'not used: config/fastdds.xml has UDP alone')
+        return Finding(OK, 'shared memory', 'not used: config/fastdds.xml has UDP alone')
     if not os.access(SHARED_MEMORY, os.W_OK):
-        return Finding(Level.NOTE, 'shared memory', f'{SHARED_MEMORY} cannot be written: Fast DDS falls back to UDP')
+        return Finding(NOTE, 'shared memory', f'{SHARED_MEMORY} cannot be written: Fast DDS falls back to UDP')
     free = shutil.disk_usage(SHARED_MEMORY).free
     names = ('fastrtps_*', 'fastdds_*')  # Jazzy, Kilted
     files = sum(len(list(SHARED_MEMORY.glob(name))) for name in names)
     text = f'{free >> 20} MiB free, {files} files of Fast DDS'
     if free < SMALLEST_SHARED_MEMORY:
-        return Finding(Level.NOTE, 'shared memory', f'{text}: with no node running, remove {" and ".join(names)} there')
-    return Finding(Level.OK, 'shared memory', text)
+        return Finding(NOTE, 'shared memory', f'{text}: with no node running, remove {" and ".join(names)} there')
+    return Finding(OK, 'shared memory', text)
 
 
 def _priority() -> Finding:
@@ -137,6 +132,6 @@ def _priority() -> Finding:
     attempt = 'import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))'
     granted = subprocess.run([sys.executable, '-S', '-c', attempt], capture_output=True, check=False).returncode == 0
     if granted:
-        return Finding(Level.OK, 'real-time priority', 'granted')
+        return Finding(OK, 'real-time priority', 'granted')
     hint = 'give the user an rtprio limit (/etc/security/limits.conf) or the process CAP_SYS_NICE'
-    return Finding(Level.NOTE, 'real-time priority', f'not granted: {hint}, or leave realtime_priority at 0')
+    return Finding(NOTE, 'real-time priority', f'not granted: {hint}, or leave realtime_priority at 0')

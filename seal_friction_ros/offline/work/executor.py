@@ -38,6 +38,8 @@ def try_all(
     workers: Workers,
     on_outcome: Callable[[int, Outcome[Result]], None] = lambda *_: None,
     prepare: Callable[[], None] = nothing,
+    *,
+    stop_at_error: bool = False,
 ) -> list[Outcome[Result]]:
     """Run every call, whatever becomes of the others, and return the outcomes in their order.
 
@@ -50,39 +52,31 @@ def try_all(
         workers: Calls at a time, or a cluster.
         on_outcome: Called in this process with the number of a call and its outcome, as soon as it is done.
         prepare: Called before the processes of this computer begin; they inherit what it loads and compiles.
+        stop_at_error: Begin no further call after an error; those that were not begun are left out.
     """
     outcomes: dict[int, Outcome[Result]] = {}
-    for number, outcome in _completed(label, calls, workers, prepare, stop_at_error=False):
+    for number, outcome in _completed(label, calls, workers, prepare, stop_at_error=stop_at_error):
         outcomes[number] = outcome
         on_outcome(number, outcome)
-    return [outcomes[number] for number in range(len(calls))]
+    return [outcomes[number] for number in sorted(outcomes)]
 
 
 def run_all(
-    label: str,
-    calls: Sequence[Callable[[], Result]],
-    workers: Workers,
-    on_result: Callable[[int, Result], None] = lambda *_: None,
-    prepare: Callable[[], None] = nothing,
+    label: str, calls: Sequence[Callable[[], Result]], workers: Workers, prepare: Callable[[], None] = nothing
 ) -> list[Result]:
     """Run calls that are of use only together, and return their results in order; arguments as `try_all`.
 
-    ``on_result`` is called in this process with the number of a call and its result, as soon as it is done. ValueError:
-    a call failed: the first one, in the order of the calls; or the cluster cannot be used. No further call is begun
-    after an error.
+    ValueError: a call failed: the first one, in the order of the calls; or the cluster cannot be used.
     """
-    results: dict[int, Result] = {}
-    errors: dict[int, str] = {}
-    for number, (result, error) in _completed(label, calls, workers, prepare, stop_at_error=True):
+    return results_of(label, try_all(label, calls, workers, prepare=prepare, stop_at_error=True))
+
+
+def results_of(label: str, outcomes: Sequence[Outcome[Result]]) -> list[Result]:
+    """Results of calls; ValueError with the first error."""
+    for _, error in outcomes:
         if error:
-            errors[number] = error
-        else:
-            results[number] = cast(Result, result)
-            on_result(number, results[number])
-    if errors:
-        error = errors[min(errors)]
-        raise ValueError(f'{label}: {error}' if error == CRASHED else error)
-    return [results[number] for number in range(len(calls))]
+            raise ValueError(f'{label}: {error}' if error == CRASHED else error)
+    return [cast(Result, outcome.result) for outcome in outcomes]
 
 
 class _Worker:

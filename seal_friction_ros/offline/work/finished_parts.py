@@ -17,7 +17,7 @@ import numpy as np
 from seal_friction_ros.core.foundation.documents import parse_json
 from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.offline.work.atomic_file import write_whole
-from seal_friction_ros.offline.work.executor import Workers, nothing, run_all, try_all
+from seal_friction_ros.offline.work.executor import Workers, nothing, results_of, try_all
 from seal_friction_ros.offline.work.outcome import CRASHED, Outcome
 from seal_friction_ros.offline.work.places import Place, url_digest
 from seal_friction_ros.offline.work.versions import versions
@@ -87,30 +87,36 @@ def run_parts(
     The folder keeps every finished part as a JSON file, also when a later part fails; None keeps none. Other arguments
     as of `try_all`. ValueError: a part failed, or the folder or the cluster cannot be used.
     """
-    outcomes, missing = _found(parts, Kept(folder, retry_failed=True))
-
-    def keep(place: int, result: Any) -> None:
-        _keep(folder, parts, outcomes, missing[place], Outcome(result))
-
-    run_all(label, [parts[number].call for number in missing], workers, keep, prepare)
-    return [outcomes[number].result or {} for number in range(len(parts))]
+    kept = Kept(folder, retry_failed=True)
+    return results_of(label, try_parts(label, parts, workers, kept, prepare, stop_at_error=True))
 
 
 def try_parts(
-    label: str, parts: Sequence[Part], workers: Workers, kept: Kept, prepare: Callable[[], None] = nothing
+    label: str,
+    parts: Sequence[Part],
+    workers: Workers,
+    kept: Kept,
+    prepare: Callable[[], None] = nothing,
+    *,
+    stop_at_error: bool = False,
 ) -> list[Outcome[Values]]:
-    """Outcomes, in order, of parts that may fail one by one; other arguments as of `run_parts`.
+    """Outcomes, in order, of parts that may fail one by one; other arguments as of `run_parts` and `try_all`.
 
-    An error of a part is kept like a result; that its process crashed is not. Raises ValueError if the folder or the
-    cluster cannot be used.
+    An error of a part is kept like a result, unless it ends the work; that its process crashed is not. ValueError: the
+    folder or the cluster cannot be used.
     """
     outcomes, missing = _found(parts, kept)
 
     def keep(place: int, outcome: Outcome[Any]) -> None:
-        _keep(kept.folder, parts, outcomes, missing[place], outcome)
+        result: Any = outcome.result
+        values = result._asdict() if hasattr(result, '_asdict') else result
+        outcomes[missing[place]] = outcome._replace(result=values)
+        if kept.folder is not None and not (outcome.error == CRASHED or (outcome.error and stop_at_error)):
+            _write(kept.folder, parts[missing[place]].key, outcomes[missing[place]])
 
-    try_all(label, [parts[number].call for number in missing], workers, keep, prepare)
-    return [outcomes[number] for number in range(len(parts))]
+    calls = [parts[number].call for number in missing]
+    try_all(label, calls, workers, keep, prepare, stop_at_error=stop_at_error)
+    return [outcomes[number] for number in sorted(outcomes)]
 
 
 def keys_of(
@@ -136,19 +142,11 @@ def _found(parts: Sequence[Part], kept: Kept) -> tuple[dict[int, Outcome[Values]
     return outcomes, [number for number in range(len(parts)) if number not in outcomes]
 
 
-def _keep(
-    folder: Path | None, parts: Sequence[Part], outcomes: dict[int, Outcome[Values]], number: int, outcome: Outcome[Any]
-) -> None:
-    """Take the outcome of a part, and write its file."""
-    result: Any = outcome.result
-    values = result._asdict() if hasattr(result, '_asdict') else result
-    outcomes[number] = outcome._replace(result=values)
-    if folder is None or outcome.error == CRASHED:
-        return
-    plain = {name: v.tolist() if isinstance(v, np.ndarray) else v for name, v in (values or {}).items()}
+def _write(folder: Path, key: str, outcome: Outcome[Values]) -> None:
+    plain = {name: v.tolist() if isinstance(v, np.ndarray) else v for name, v in (outcome.result or {}).items()}
     content = {_ERROR: outcome.error} if outcome.error else plain
     with named_errors(f'{folder}: cannot keep a finished part', OSError):
-        write_whole(folder / f'{parts[number].key}.json', json.dumps(content).encode())
+        write_whole(folder / f'{key}.json', json.dumps(content).encode())
 
 
 _ERROR = 'error: '  # the only name in the file of a part that failed; no name of a value is spelled like this

@@ -46,5 +46,4 @@ def write_seal(document: Mapping[str, Any], out: Path, comment: str = '') -> Non
     content = (''.join(f'# {line}\n' for line in comment.splitlines()) + seal_text(document)).encode()
     parse_seal(parse_yaml(content, str(out)))
     with named_errors(f'{out}: cannot write the seal file', OSError):
-        out.parent.mkdir(parents=True, exist_ok=True)
         write_whole(out, content)

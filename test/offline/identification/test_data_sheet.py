@@ -10,12 +10,13 @@ from seal_friction_ros.core.foundation.units import INCH
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.identification.data_sheet import (
+    DIMENSIONS,
     FrictionTestPlan,
     columns,
     read_data_sheet,
     sheet_text,
 )
-from seal_friction_ros.offline.reports.data_sheet_page import write_data_sheet_page
+from seal_friction_ros.offline.reports.page import write_page
 
 THESIS = ROOT / 'data' / 'thesis' / 'friction_tests.csv'
 RING = SealGeometry(0.106 * INCH, 0.612 * INCH, 0.625 * INCH, 0.821 * INCH)
@@ -64,7 +65,7 @@ def test_the_sheet_has_the_132_cells_of_the_thesis():
 
 
 def test_the_printed_page_has_the_same_cells_and_the_thirty_seconds(tmp_path):
-    write_data_sheet_page(plan(), tmp_path / 'sheet.html')
+    write_page(tmp_path / 'sheet.html', 'data_sheet', (), plan=plan(), dimensions=DIMENSIONS, command='sheet')
     assert [path.name for path in tmp_path.iterdir()] == ['sheet.html']
     page = (tmp_path / 'sheet.html').read_text()
     assert page.count('<td') - page.count('<td>0</td>') >= 132

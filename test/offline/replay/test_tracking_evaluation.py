@@ -316,7 +316,7 @@ def test_what_acted_is_what_was_recorded(tmp_path):
     found = evaluate_tracking(run)
     (stretch,) = found.stretches
     assert (stretch.has_feedforward, stretch.feedforward_peak, stretch.settings.scale) == (False, 0.0, 0.0)
-    assert tracking_summary(found).endswith('RMS without feed-forward')
+    assert tracking_summary(found).endswith('RMS, without feed-forward')
     assert 'did not act' in found.notes[0]
     recorded = evaluate_tracking(read_run(tmp_path / 'recorded'))
     assert (stretch.rms, stretch.dwell) == (recorded.stretches[0].rms, recorded.stretches[0].dwell)

@@ -26,6 +26,7 @@ from seal_friction_ros.offline.reports.page import (
     write_page,
 )
 
+OFFLINE = TEMPLATES.parents[1]
 EVIL = '<script>alert("1")</script>&\''
 FROM = {'verdict': Verdict(GOOD, 'fine'), 'head': Head('seal_friction report bag'), 'warnings': []}
 PARTS = {'base', 'macros', 'lubrication', 'uncertainty'}
@@ -86,8 +87,8 @@ def test_a_template_is_strict_about_missing_values(name):
 
 
 def test_every_template_belongs_to_a_report():
-    sources = ''.join(path.read_text() for path in TEMPLATES.parent.glob('*.py'))
-    assert sorted(re.findall(r"write_(?:case_)?page\(\s*out,\s*'(\w+)'", sources)) == PAGES
+    sources = ''.join(path.read_text() for room in ('reports', 'commands') for path in (OFFLINE / room).glob('*.py'))
+    assert sorted({*re.findall(r"write_(?:case_)?page\(\s*(?:out|page),\s*'(\w+)'", sources)}) == PAGES
 
 
 def test_the_templates_are_installed():

@@ -7,16 +7,15 @@ import numpy as np
 import pytest
 from harness.report_page import checked_page
 
+from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.friction.states import state_friction
 from seal_friction_ros.core.servo.motions import Sine
+from seal_friction_ros.core.servo.position_servo import ServoParameters
+from seal_friction_ros.files import load_seals
 from seal_friction_ros.offline.commands.main import main
-from seal_friction_ros.offline.reports.servo_charts import (
-    default_servo,
-    follow_wave,
-    write_servo_charts,
-)
+from seal_friction_ros.offline.reports.servo_charts import follow_wave, write_servo_charts
 
-SERVO = default_servo()
+SERVO = ServoParameters(seals=load_seals(SealSelection()))
 WAVE = Sine()
 RUBBING = follow_wave(SERVO, WAVE)
 FREE = follow_wave(dataclasses.replace(SERVO, seals=()), WAVE)

@@ -5,7 +5,7 @@ import pytest
 from seal_friction_ros.core.estimation.findings import BAD, GOOD, LOOK
 from seal_friction_ros.offline.reports import verdicts
 
-LAW = verdicts.IdentificationNumbers('law', 0.05, 0.08, 0.95, '', False, False, False)
+LAW = {'law': 'law', 'error': 0.05, 'largest': 0.08, 'coverage': 0.95, 'unsound': ''}
 
 
 @pytest.mark.parametrize(
@@ -18,13 +18,15 @@ LAW = verdicts.IdentificationNumbers('law', 0.05, 0.08, 0.95, '', False, False, 
         ({'coverage': 0.89}, LOOK),
         ({'coverage': 0.4}, BAD),
         ({'unsound': 'singular'}, BAD),
-        ({'outlier': True}, LOOK),
-        ({'changed': True}, LOOK),
-        ({'drifted': True}, LOOK),
     ],
 )
 def test_an_identified_law_is_judged_on_readings_that_it_has_not_seen(changed, level):
-    assert verdicts.of_identification(LAW._replace(**changed)).level == level
+    assert verdicts.of_identification(**{**LAW, **changed}).level == level
+
+
+@pytest.mark.parametrize('remark', verdicts.REMARKS)
+def test_what_is_unusual_about_the_readings_is_to_be_looked_at(remark):
+    assert verdicts.of_identification(*LAW.values(), remark).level == LOOK
 
 
 @pytest.mark.parametrize('mass', [-0.415, 0.0])

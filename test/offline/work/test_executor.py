@@ -12,7 +12,7 @@ import pytest
 from paths import ROOT
 
 from seal_friction_ros.offline.work import executor
-from seal_friction_ros.offline.work.executor import run_all, try_all
+from seal_friction_ros.offline.work.executor import results_of, run_all, try_all
 from seal_friction_ros.offline.work.outcome import Outcome
 from seal_friction_ros.offline.work.progress import progress
 
@@ -63,10 +63,10 @@ def test_of_calls_for_one_result_the_first_error_counts_and_no_further_call_begi
         return number
 
     done: list[int] = []
+    calls = [partial(mark, number) for number in range(30)]
+    outcomes = try_all('marks', calls, workers, lambda number, _: done.append(number), stop_at_error=True)
     with pytest.raises(ValueError, match='call 2'):
-        run_all(
-            'marks', [partial(mark, number) for number in range(30)], workers, lambda number, _: done.append(number)
-        )
+        results_of('marks', outcomes)
     assert {0, 1} <= set(done)
     assert len(list(tmp_path.iterdir())) <= 3 + 2 * workers
 

@@ -22,16 +22,8 @@ const UNANSWERED = 'NOT CONFIRMED: the monitor does not answer; stop the machine
 const KINDS = ['no', 'waiting', 'gone', 'yes'];  // of the lines of OFF, failures first
 const LEVELS = ['good', 'look', 'bad', 'bad'];
 const LEVEL_WORDS = ['OK', 'WARN', 'ERROR', 'STALE'];
-const LAMPS = {
-  CLAMP: ['clamp', 'the force is cut by force_limit'],
-  SLEW: ['slew', 'the force changes at slew_limit: usual for a moment at each reversal'],
-  FADE: ['fade', 'the force fades: an input or the reference is not usable, or was until a moment ago'],
-};
-const SETTINGS = {
-  scale: {words: 'Scale: share of the friction that is compensated', unit: '', factor: 1, max: 2, step: 0.05},
-  lead_time: {words: 'Lead time', unit: 'ms', factor: 1e3, max: 20, step: 0.5},
-  force_limit: {words: 'Limit: largest force', unit: 'N', factor: 1, max: 0, step: 1},
-};
+const LAMPS = ['CLAMP', 'SLEW', 'FADE'];
+const SETTINGS = {scale: 1, lead_time: 1e3, force_limit: 1};  // name -> its SI unit in the unit of the page
 // A curve: column, name, colour, and how it is drawn. A band lies between its two columns.
 const PLOTS = [
   {id: 'friction', title: 'Friction', unit: 'N', band: ['high', 'low', SKY, '95 % of readings'],
@@ -203,24 +195,16 @@ function makeCharts() {
     const unit = [plot.unit && `[${plot.unit}]`, plot.note].filter(Boolean).join(' ');
     if (unit) title.append(' ', element('small', unit));
     const legend = element('div', '', 'legend');
-    const values = plot.curves.filter(([, name]) => name).map(([column, name, colour, style]) => {
-      const entry = element('span', '', style || '');
+    const named = (text, colour, style) => {
+      const entry = element('span', text, style), value = element('b');
       entry.style.borderColor = colour;
-      const value = element('b');
-      entry.append(`${name} `, value);
+      if (style !== 'area') entry.append(value);
       legend.append(entry);
-      return {column, value};
-    });
-    if (plot.band) {
-      const entry = element('span', plot.band[3], 'area');
-      entry.style.borderColor = `${plot.band[2]}88`;
-      legend.append(entry);
-    }
-    if (plot.shade) {
-      const entry = element('span', 'identified range', 'area');
-      entry.style.borderColor = '#009e7344';
-      legend.append(entry);
-    }
+      return value;
+    };
+    const values = plot.curves.filter(([, name]) => name).map(([column, name, colour, style]) => ({column, value: named(`${name} `, colour, style)}));
+    if (plot.band) named(plot.band[3], `${plot.band[2]}88`, 'area');
+    if (plot.shade) named('identified range', '#009e7344', 'area');
     const empty = element('div', plot.empty, 'empty');
     figure.append(title, legend, empty);
     byId('plots').append(figure);
@@ -375,17 +359,7 @@ function writeAges() {
 }
 
 function writeLamps() {
-  const lamps = byId('lamps');
-  if (!lamps.children.length) {
-    for (const [name, [word, title]] of Object.entries(LAMPS)) {
-      const lamp = element('div', '', 'lamp');
-      lamp.id = `lamp-${name}`;
-      lamp.title = title;
-      lamp.append(element('i'), word);
-      lamps.append(lamp);
-    }
-  }
-  for (const name of Object.keys(LAMPS)) byId(`lamp-${name}`).classList.toggle('lit', now.feedforward !== null && now.lamps[name]);
+  for (const name of LAMPS) byId(`lamp-${name}`).classList.toggle('lit', now.feedforward !== null && now.lamps[name]);
 }
 
 function writeTracking() {
@@ -500,35 +474,25 @@ function pressLift() {
   else setTimeout(() => arm(false), ARMED_FOR);
 }
 
-function writeSliders() {
-  const box = byId('sliders');
-  if (about.mode !== 'live' || !now.seals.length) return;
-  byId('settings').hidden = false;
-  replaceIfChanged(box, label, () => Object.entries(SETTINGS).map(([name, {words, unit, factor, max, step}]) => {
-    const made = element('div', '', 'slider');
-    const value = (now.settings[name] || 0) * factor;
-    const title = element('label', words);
-    if (unit) title.append(' ', element('small', `[${unit}]`));
-    const slide = element('input'), field = element('input');
-    slide.type = 'range';
-    field.type = 'number';
-    slide.id = `slide-${name}`;
-    field.id = `field-${name}`;
-    title.htmlFor = slide.id;
-    field.setAttribute('aria-label', words);
-    for (const input of [slide, field]) {
-      input.min = 0;
-      input.step = step;
-      input.addEventListener('change', () => input.value !== '' && change(name, Number(input.value) / factor, [slide, field]));
+const inputsOf = (name) => [byId(`slide-${name}`), byId(`field-${name}`)];
+
+function listenToSliders() {
+  for (const [name, factor] of Object.entries(SETTINGS)) {
+    for (const input of inputsOf(name)) {
+      input.addEventListener('change', () => input.value !== '' && change(name, Number(input.value) / factor, inputsOf(name)));
     }
-    field.step = 'any';
-    slide.max = max || Math.max(Math.ceil(value * 2), 10);
-    made.append(title, slide, field);
-    return made;
-  }));
-  for (const [name, {factor}] of Object.entries(SETTINGS)) {  // what the node has, unless somebody is changing it
+  }
+}
+
+function writeSliders() {
+  const box = byId('settings');
+  if (about.mode !== 'live' || !now.seals.length) return;
+  box.hidden = false;
+  if (box.dataset.told !== label) byId('slide-force_limit').max = Math.max(Math.ceil(2 * (now.settings.force_limit || 0)), 10);
+  box.dataset.told = label;
+  for (const [name, factor] of Object.entries(SETTINGS)) {  // what the node has, unless somebody is changing it
     const value = now.settings[name];
-    for (const input of [byId(`slide-${name}`), byId(`field-${name}`)]) {
+    for (const input of inputsOf(name)) {
       input.disabled = !about.can_change || (name === 'scale' && off !== null);
       const shown = value === null ? '' : String(+(value * factor).toPrecision(6));
       if (input !== document.activeElement && input.dataset.shown !== shown) input.value = input.dataset.shown = shown;
@@ -731,15 +695,14 @@ async function begin() {
   clearRows();
   const isLive = about.mode === 'live';
   makeSpans(isLive ? [2, 5, 10, 30] : [2, 5, 10, 60]);
-  byId('hold').hidden = !isLive;
+  for (const id of ['hold', 'diagnostics-card', 'off']) byId(id).hidden = !isLive;
   byId('player').hidden = isLive;
-  byId('diagnostics-card').hidden = !isLive;
-  byId('off').hidden = !isLive;
   byId('off').disabled = !about.can_change;
-  byId('off').append(element('small', about.can_change ? 'all feed-forwards' : 'read only'));
+  setText(byId('off-note'), about.can_change ? 'all feed-forwards' : 'read only');
   byId('off').title = about.can_change ? 'sets the scale of every feed-forward to 0' : 'start the monitor with --allow-changes';
   byId('off').addEventListener('click', pressOff);
   byId('lift').addEventListener('click', pressLift);
+  listenToSliders();
   byId('hold').addEventListener('click', () => {
     held = !held;
     byId('hold').setAttribute('aria-pressed', String(held));
