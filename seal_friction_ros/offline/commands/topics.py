@@ -7,8 +7,6 @@ import sys
 from importlib.util import find_spec
 from typing import Any
 
-import yaml
-
 from seal_friction_ros.offline.commands import command_line as cli
 from seal_friction_ros.offline.work.status import show_status
 from seal_friction_ros.offline.work.targets import LIVE_PARAMETERS, mark
@@ -95,6 +93,8 @@ def _save(arguments: argparse.Namespace, given: dict[str, Any]) -> int:
 
 def _parameter_text(node: str, parameters: list[dict[str, Any]]) -> str:
     """A parameter file of a node."""
+    import yaml
+
     lines = [f'# What changes live of {node}, {mark("topics")} param. Give it after your own file.', f'{node}:']
     lines.append('  ros__parameters:')
     for one in parameters:
