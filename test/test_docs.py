@@ -309,7 +309,7 @@ def test_measuring_again_writes_table_commit_and_date_and_leaves_the_others(tmp_
     table = '|  | deep: x |\n|---|---|\n| one | 2 |\n| two | 4, 5 |'
     head = f'`python {bench} --fast` (fedc3210, {time.strftime("%Y-%m-%d")})'
     assert text == f'{head}\n\n<!-- measured: deep: x -->\n{table}\n<!-- end -->\n{other}'
-    assert make_docs.figures_table({'a': 1.23456, 'b': 'yes'}) == '|  | value |\n|---|---|\n| a | 1.23 |\n| b | yes |'
+    assert make_docs.figures_table({'a': 1.23456, 'b': 2}, ['a']) == '| figure | value |\n|---|---|\n| a | 1.23 |'
     assert make_docs.figures_table([{'rate': 5, 'ok': True}]) == '| rate | ok |\n|---|---|\n| 5 | True |'
     with pytest.raises(ValueError, match=r'bench/none.py: no table of measured.md is of it'):
         make_docs.measured_again(other, 'bench/none.py', 'fedc3210')

@@ -4,7 +4,7 @@ Each stands between ``<!-- table: NAME -->`` and ``<!-- end -->``.
 
 The tables of docs/measured.md follow from benches and campaigns, whose command, commit and date stand above each:
 ``python tools/make_docs.py --measure bench/step.py`` runs the commands of that script again, with ``--json``, and
-writes table, commit and date. ``<!-- measured: NAME, NAME -->`` names the columns to show; without names all.
+writes table, commit and date. ``<!-- measured: NAME, NAME -->`` names the columns, or figures, to show.
 """
 
 import argparse
@@ -323,21 +323,20 @@ def _measured(found: re.Match[str], commit: str) -> str:
     return f'{head}\n\n<!-- measured{names and ": "}{names} -->\n{shown}\n<!-- end -->'
 
 
-def figures_table(found: Any, columns: Sequence[str] = ()) -> str:
-    """Markdown table of what a bench or campaign prints as JSON: rows, rows by name, or figures by name."""
+def figures_table(found: Any, names: Sequence[str] = ()) -> str:
+    """Markdown table of what a bench or campaign prints as JSON: rows, rows by name, or figures by name.
+
+    ``names`` are the columns, or the figures, to show; empty: all.
+    """
     if isinstance(found, list):
         rows = [_figures(row) for row in found]
+    elif all(isinstance(row, dict) for row in found.values()):
+        rows = [{'': name, **_figures(row)} for name, row in found.items()]
     else:
-        by_name = found if all(isinstance(row, dict) for row in found.values()) else _figures(found)
-        rows = [
-            {'': name, **(_figures(row) if isinstance(row, dict) else {'value': row})} for name, row in by_name.items()
-        ]
-    first = next(iter(rows[0]))
-    heads = [
-        head
-        for head in dict.fromkeys(head for row in rows for head in row)
-        if head == first or not columns or head in columns
-    ]
+        figures = {name: value for name, value in _figures(found).items() if not names or name in names}
+        rows, names = [{'figure': name, 'value': value} for name, value in figures.items()], ()
+    first, *others = dict.fromkeys(head for row in rows for head in row)
+    heads = [first, *(head for head in others if not names or head in names)]
     lines = [' | '.join(_cell(row.get(head, '')) for head in heads) for row in rows]
     return '\n'.join([f'| {" | ".join(heads)} |', f'|{"---|" * len(heads)}', *(f'| {line} |' for line in lines)])
 
