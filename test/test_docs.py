@@ -8,6 +8,7 @@ import time
 import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -285,6 +286,33 @@ def test_services_named_in_the_readme_are_those_of_the_node():
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
 def test_tables_are_those_of_the_code(page: Path):
     assert make_docs.filled(page.read_text()) == page.read_text()
+
+
+def test_every_measured_figure_has_the_command_that_makes_it_with_commit_and_date():
+    """Where there is a digit between two headings there is a command, and one stands above each table."""
+    sections = re.split(r'^#+ .*$', make_docs.MEASURED_PAGE.read_text(), flags=re.MULTILINE)[2:]
+    for section in sections:
+        assert not re.search(r'\d', section) or make_docs.COMMAND.search(section), section
+        assert section.count('<!-- measured') == len(make_docs.MEASURED.findall(section)), section
+        for found in make_docs.COMMAND.finditer(section):
+            date.fromisoformat(found['date'])
+            for script in re.findall(r'\S+\.py', found['command']):
+                assert (ROOT / script).is_file(), script
+
+
+def test_measuring_again_writes_table_commit_and_date_and_leaves_the_others(tmp_path: Path):
+    bench = tmp_path / 'bench.py'
+    bench.write_text('print(\'{"one": {"us": 1.2345, "deep": {"x": 2}}, "two": {"us": 3.0, "deep": {"x": [4, 5]}}}\')')
+    block = '`python {} --fast` (0123abcd, 2020-01-01)\n\n<!-- measured{} -->\nold\n<!-- end -->\n'
+    other = block.format('bench/step.py', '')
+    text = make_docs.measured_again(block.format(bench, ': deep: x') + other, str(bench), 'fedc3210')
+    table = '|  | deep: x |\n|---|---|\n| one | 2 |\n| two | 4, 5 |'
+    head = f'`python {bench} --fast` (fedc3210, {time.strftime("%Y-%m-%d")})'
+    assert text == f'{head}\n\n<!-- measured: deep: x -->\n{table}\n<!-- end -->\n{other}'
+    assert make_docs.figures_table({'a': 1.23456, 'b': 2}, ['a']) == '| figure | value |\n|---|---|\n| a | 1.23 |'
+    assert make_docs.figures_table([{'rate': 5, 'ok': True}]) == '| rate | ok |\n|---|---|\n| 5 | True |'
+    with pytest.raises(ValueError, match=r'bench/none.py: no table of measured.md is of it'):
+        make_docs.measured_again(other, 'bench/none.py', 'fedc3210')
 
 
 def test_the_parameter_file_of_the_simulator_lists_those_of_the_code():

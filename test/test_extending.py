@@ -32,6 +32,7 @@ from seal_friction_ros.offline.bags.bag import bag_topics
 from seal_friction_ros.offline.replay.parallel_replay import verify
 
 RECIPE = (ROOT / 'docs' / 'extending.md').read_text()
+TOY_LAW = (ROOT / 'test' / 'harness' / 'tanh_law.py').read_text()
 SECOND = 10**9  # [ns]
 NAMED = ('test_every_law_is_on_an_actuator', 'test_tables_are_those_of_the_code')
 """Tests that fail until the last steps of the recipe."""
@@ -39,10 +40,10 @@ NAMED = ('test_every_law_is_on_an_actuator', 'test_tables_are_those_of_the_code'
 
 @pytest.fixture(scope='module')
 def toy_law(tmp_path_factory):
-    """Module of the first Python block of the recipe, and the registry line."""
+    """Module of the law of the recipe, and the registry line."""
     name = re.search(r'`seal_friction_ros/(core/friction/laws/\w+)\.py`', RECIPE)[1].replace('/', '.')
     path = tmp_path_factory.mktemp('laws') / f'{name.rpartition(".")[2]}.py'
-    path.write_text(re.search(r'```python\n(.*?)```', RECIPE, re.DOTALL)[1])
+    path.write_text(TOY_LAW)
     spec = importlib.util.spec_from_file_location(f'seal_friction_ros.{name}', path)
     module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -140,7 +141,7 @@ def test_the_servo_simulator_runs_it(seal_file):
 def test_only_the_tests_that_the_recipe_names_turn_red(tmp_path):
     tree = shutil.copytree(ROOT, tmp_path / 'tree', ignore=shutil.ignore_patterns('.*', 'build', '__pycache__'))
     laws = tree / 'seal_friction_ros' / 'core' / 'friction' / 'laws'
-    (laws / 'tanh_law.py').write_text(re.search(r'```python\n(.*?)```', RECIPE, re.DOTALL)[1])
+    (laws / 'tanh_law.py').write_text(TOY_LAW)
     registry = (laws / '__init__.py').read_text().replace('FrictionMap]', 'FrictionMap, TanhLaw]')
     module = 'seal_friction_ros.core.friction.laws.tanh_law'
     (laws / '__init__.py').write_text(registry.replace('\n\n', f'\n\nfrom {module} import TanhLaw\n', 1))

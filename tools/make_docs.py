@@ -1,16 +1,25 @@
 """Write the tables of docs/ that follow from the code: ``python tools/make_docs.py``; a test compares them.
 
 Each stands between ``<!-- table: NAME -->`` and ``<!-- end -->``.
+
+The tables of docs/measured.md follow from benches and campaigns, whose command, commit and date stand above each:
+``python tools/make_docs.py --measure bench/step.py`` runs the commands of that script again, with ``--json``, and
+writes table, commit and date. ``<!-- measured: NAME, NAME -->`` names the columns, or figures, to show.
 """
 
 import argparse
 import dataclasses
 import inspect
+import json
 import re
+import shlex
+import subprocess
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import takewhile
 from pathlib import Path
+from typing import Any
 
 from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS
 from seal_friction_ros.core.foundation.parameters import Meaning, ParameterGroup, meanings
@@ -56,6 +65,7 @@ from seal_friction_ros.core.friction.temperature import TemperatureScale
 from seal_friction_ros.core.friction.term_covariance import TermCovariance
 
 DOCS = Path(__file__).parents[1] / 'docs'
+MEASURED_PAGE = DOCS / 'measured.md'
 SIMULATOR_FILE = DOCS.parent / 'config' / 'servo_simulator.yaml'
 SEAL_PARTS = (
     SealGeometry,
@@ -290,8 +300,71 @@ def filled_parameter_file(text: str) -> str:
     return before + mark + after.partition('\n')[0] + '\n' + parameter_comments(SERVO_SIMULATOR_PARAMETERS)
 
 
+COMMAND = re.compile(
+    r'`(?P<command>[^`\n]*python (?P<script>(?:-m )?[^` ]+)[^`\n]*)` \((?P<commit>[0-9a-f]{7,}), (?P<date>[\d-]+)\)'
+)
+"""Line above a table of measured.md: the command, and commit and date of the run."""
+MEASURED = re.compile(COMMAND.pattern + r'\n\n<!-- measured(?:: (?P<columns>[^\n]*))? -->\n.*?<!-- end -->', re.DOTALL)
+
+
+def measured_again(text: str, script: str, commit: str) -> str:
+    """Text of measured.md with what the commands of a script give now; ValueError if none of its tables is of it."""
+    if not any(found['script'] == script for found in MEASURED.finditer(text)):
+        raise ValueError(f'{script}: no table of {MEASURED_PAGE.name} is of it')
+    return MEASURED.sub(lambda found: _measured(found, commit) if found['script'] == script else found[0], text)
+
+
+def _measured(found: re.Match[str], commit: str) -> str:
+    words = [sys.executable if word == 'python' else word for word in shlex.split(found['command'])]
+    run = subprocess.run([*words, '--json'], cwd=DOCS.parent, stdout=subprocess.PIPE, text=True, check=True)
+    names = found['columns'] or ''
+    shown = figures_table(json.loads(run.stdout.splitlines()[-1]), [name for name in names.split(', ') if name])
+    head = f'`{found["command"]}` ({commit}, {time.strftime("%Y-%m-%d")})'
+    return f'{head}\n\n<!-- measured{names and ": "}{names} -->\n{shown}\n<!-- end -->'
+
+
+def figures_table(found: Any, names: Sequence[str] = ()) -> str:
+    """Markdown table of what a bench or campaign prints as JSON: rows, rows by name, or figures by name.
+
+    ``names`` are the columns, or the figures, to show; empty: all.
+    """
+    if isinstance(found, list):
+        rows = [_figures(row) for row in found]
+    elif all(isinstance(row, dict) for row in found.values()):
+        rows = [{'': name, **_figures(row)} for name, row in found.items()]
+    else:
+        figures = {name: value for name, value in _figures(found).items() if not names or name in names}
+        rows, names = [{'figure': name, 'value': value} for name, value in figures.items()], ()
+    first, *others = dict.fromkeys(head for row in rows for head in row)
+    heads = [first, *(head for head in others if not names or head in names)]
+    lines = [' | '.join(_cell(row.get(head, '')) for head in heads) for row in rows]
+    return '\n'.join([f'| {" | ".join(heads)} |', f'|{"---|" * len(heads)}', *(f'| {line} |' for line in lines)])
+
+
+def _figures(row: Mapping[str, Any], above: str = '') -> dict[str, Any]:
+    """Figures of a row by name, those of a part as PART: NAME."""
+    figures: dict[str, Any] = {}
+    for name, value in row.items():
+        figures |= _figures(value, f'{above}{name}: ') if isinstance(value, dict) else {f'{above}{name}': value}
+    return figures
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, list):
+        return ', '.join(map(_cell, value))
+    return f'{value:.3g}' if isinstance(value, float) else str(value)
+
+
 def main() -> int:
-    """Write every page, and the parameter file."""
+    """Write every page, and the parameter file; or measure again."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--measure', metavar='SCRIPT', help='run its commands in docs/measured.md again')
+    if script := parser.parse_args().measure:
+        commit = subprocess.run(
+            ['git', 'rev-parse', '--short=8', 'HEAD'], stdout=subprocess.PIPE, text=True, check=True
+        )
+        MEASURED_PAGE.write_text(measured_again(MEASURED_PAGE.read_text(), script, commit.stdout.strip()))
+        return 0
     for page in sorted(DOCS.glob('*.md')):
         page.write_text(filled(page.read_text()))
     SIMULATOR_FILE.write_text(filled_parameter_file(SIMULATOR_FILE.read_text()))

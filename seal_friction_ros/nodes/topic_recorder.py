@@ -8,13 +8,16 @@ from functools import partial
 from pathlib import Path
 
 import rclpy
-from rclpy.node import Node
+from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.utilities import remove_ros_args
 
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.executor import run_tool
+from seal_friction_ros.nodes.graph_watch import full_name
 from seal_friction_ros.nodes.managed_node import message_class
 from seal_friction_ros.offline.bags.bag import BagError, BagWriter
+
+_OF_EVERY_NODE = ('/rosout', '/parameter_events', '/transition_event')
 
 
 class TopicRecorder(Node):
@@ -35,12 +38,33 @@ class TopicRecorder(Node):
                 take, profile = partial(self._take, topic, kind), qos.best_effort(qos.STREAM)
                 self.create_subscription(message_class(kind), topic, take, profile, raw=True)
 
+    def silent(self) -> list[str]:
+        """Topics of the types that have a publisher and no message, and nodes that publish nothing."""
+        heard, found = {topic for topic, *_ in self.messages}, []
+        for topic in sorted(self._topics - heard):
+            publishers = sorted(full_name(end) for end in self.get_publishers_info_by_topic(topic))
+            found += [f'{topic} of {", ".join(publishers)}'] if publishers else []
+        for name, space in sorted(self.get_node_names_and_namespaces()):
+            if name != self.get_name() and not self._published(name, space):
+                found.append(f'node {space}/{name}'.replace('//', '/'))
+        return found
+
+    def _published(self, name: str, space: str) -> list[str]:
+        """Topics of a node but those that every node has."""
+        try:
+            topics = [topic for topic, _ in self.get_publisher_names_and_types_by_node(name, space)]
+        except NodeNameNonExistentError:  # it has just gone
+            return []
+        return [topic for topic in topics if not topic.endswith(_OF_EVERY_NODE)]
+
     def _take(self, topic: str, kind: str, data: bytes) -> None:
         self.messages.append((topic, kind, time.time_ns(), data))
 
 
 def record(node: TopicRecorder, seconds: float, wait: float, out: Path) -> int:
     """Record for ``seconds`` [s], from the first message on, for which it waits ``wait`` [s] at most; exit code 0.
+
+    Prints a line for each silent topic and node.
 
     BagError: no topic of the types has a message, or the bag cannot be written.
     """
@@ -54,10 +78,12 @@ def record(node: TopicRecorder, seconds: float, wait: float, out: Path) -> int:
     if not node.messages:
         heard = ', '.join(f'{topic} ({", ".join(kinds)})' for topic, kinds in node.get_topic_names_and_types())
         hint = 'start the drivers, check ROS_DOMAIN_ID'
-        raise BagError(f'no message of a known type within {wait:g} s: {hint}; topics: {heard or "none"}')
+        there = f'topics: {heard or "none"}; silent: {"; ".join(node.silent()) or "none"}'
+        raise BagError(f'no message of a known type within {wait:g} s: {hint}; {there}')
     with BagWriter(out) as writer:
         for message in node.messages:
             writer.write(*message)
+    print(*node.silent(), sep='\n')
     return 0
 
 

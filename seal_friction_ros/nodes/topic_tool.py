@@ -154,6 +154,18 @@ class Tool:
         """Names of all parameters of a node."""
         return sorted(self.answer(client.list_parameters(), who).result.names)
 
+    def live_parameters(self, client: AsyncParameterClient, who: str) -> list[dict[str, Any]]:
+        """Name, value and meaning of each parameter of a node that changes while it runs, but ``use_sim_time``."""
+        known = self.known_parameters(client, who)
+        described = self.answer(client.describe_parameters(known), who).descriptors
+        meanings = {
+            one.name: one.description
+            for one in described
+            if not one.read_only and not one.additional_constraints and one.name != 'use_sim_time'
+        }
+        values = self.values(client, who, list(meanings))
+        return [{'name': name, 'value': values[name], 'meaning': meaning} for name, meaning in meanings.items()]
+
     def _services(self) -> dict[str, list[str]]:
         return dict(self.node.get_service_names_and_types())
 
@@ -275,6 +287,9 @@ def _param(tool: Tool, task: Mapping[str, Any], show: Callable[..., None]) -> in
     who, name = task['node'], task.get('name')
     client = tool.parameters(who)
     known = tool.known_parameters(client, who)
+    if 'save' in task:
+        show({'node': f'/{who.lstrip("/")}', 'parameters': tool.live_parameters(client, who)})
+        return SUCCESS
     if name is None:
         show(tool.values(client, who, known))
         return SUCCESS

@@ -17,6 +17,7 @@ from harness.spin_nodes import SpunNodes, ros_context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import ReliabilityPolicy, qos_profile_sensor_data
+from rclpy.time import Time
 from seal_friction_msgs.msg import FrictionEstimate, FrictionFeedForward, MachineFriction
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64MultiArray
@@ -41,11 +42,13 @@ class Drivers(Node):
         self.pressures = {name: self.create_publisher(Float64MultiArray, name, 10) for name in ('/a', '/b')}
         self.estimates: dict[str, list[FrictionEstimate]] = {name: [] for name in NAMES}
         self.commands: list[list[float]] = []
+        self.wrenches: list[WrenchStamped] = []
         self.diagnostics: list[DiagnosticArray] = []
         for name in NAMES:
             self.create_subscription(FrictionEstimate, f'/{name}/friction_estimate', self.estimates[name].append, 100)
         self.create_subscription(MachineFriction, '/machine_estimator/friction', self._on_answers, 100)
         self.create_subscription(Float64MultiArray, '/effort', lambda m: self.commands.append(list(m.data)), 100)
+        self.create_subscription(WrenchStamped, '/boom/wrench', self.wrenches.append, 100)
         self.create_subscription(DiagnosticArray, '/diagnostics', self.diagnostics.append, 10)
 
     def _on_answers(self, message: MachineFriction) -> None:
@@ -136,6 +139,24 @@ def test_three_actuators_from_one_joint_state_give_estimates_and_one_command_and
     assert result.velocity_samples == 3 * len(drivers.estimates['boom'])
     assert replay(tmp_path / 'bag', out=tmp_path / 'again').identical
     assert replay(tmp_path / 'again').identical
+
+
+def test_a_wrench_has_force_frame_and_a_fresh_stamp_and_the_bag_replays_to_the_byte(tmp_path):
+    recording = {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
+    wrench = '{topic: /boom/wrench, type: geometry_msgs/msg/WrenchStamped, frame: rod}'
+    text = EXCAVATOR.replace('{topic: /effort, type: std_msgs/msg/Float64MultiArray, index: 0}', wrench)
+    with machine(tmp_path, text, **recording) as (nodes, node, drivers):
+        heard(nodes, drivers)
+        move_until(nodes, drivers, lambda _: drivers.wrenches and drivers.wrenches[-1].wrench.force.x > 1.0)
+        newest = drivers.wrenches[-1]
+        age = drivers.get_clock().now() - Time.from_msg(newest.header.stamp)
+        assert newest.header.frame_id == 'rod'
+        assert 0 < age.nanoseconds < 10**9  # on a busy machine; within 50 ms on an idle one
+        node.finish()
+    result = replay(tmp_path / 'bag', out=tmp_path / 'again')
+    assert result.identical, result.first_difference
+    assert replay(tmp_path / 'again').identical
+    assert bag_topics(tmp_path / 'again')['/boom/wrench'].message_count >= len(drivers.wrenches)
 
 
 def test_a_topic_that_no_input_uses_is_recorded_and_the_bag_replays_to_the_byte(tmp_path):

@@ -5,6 +5,7 @@ import sys
 
 import pytest
 import yaml
+from geometry_msgs.msg import WrenchStamped
 from harness.processes import free_domain, graph_environment
 from harness.spin_nodes import SpunNodes, ros_context
 from rclpy.node import Node
@@ -45,8 +46,12 @@ def drivers():
                 senders[f'/ram/p_{chamber}'].publish(FluidPressure(fluid_pressure=pressure))
 
         node.create_timer(0.002, send)
+        idle = Node('idle', context=context, start_parameter_services=False)
+        idle.create_publisher(WrenchStamped, '/load_cell', 10)
+        compiling = Node('compiling', context=context)
         yield domain, SpunNodes(context, node)
-        node.destroy_node()
+        for made in (node, idle, compiling):
+            made.destroy_node()
 
 
 def test_the_mapping_file_of_a_running_machine_loads_and_names_gauge_pressures(tmp_path, drivers):
@@ -62,13 +67,24 @@ def test_the_mapping_file_of_a_running_machine_loads_and_names_gauge_pressures(t
     assert text.count('absolute: false}') == 2
     assert yaml.safe_load(text)['topics']['/ram/p_a'] == 'sensor_msgs/msg/FluidPressure'
     assert 'gauge' in said
+    assert 'missing: /load_cell of /idle is there but silent' in said
+    assert 'missing: node /compiling is there but silent' in said
+    assert 'node /idle' not in said
+    assert 'node /drivers' not in said
     assert 'bore' in said
 
 
-def test_a_graph_without_a_machine_is_one_line(tmp_path):
-    process = new_robot(tmp_path / 'robot.yaml', free_domain(), '--wait', '0.5')
-    _, said = process.communicate(timeout=120)
-    assert process.returncode == 2
-    assert 'no message of a known type within 0.5 s' in said
-    assert len(said.strip().splitlines()) == 1
+def test_a_graph_without_a_machine_is_one_line_with_the_nodes_that_are_silent(tmp_path):
+    with ros_context(domain := free_domain()) as context:
+        compiling = Node('compiling', context=context)
+        for wait in ('0.5', '4', '30'):  # a busy machine takes longer to find the node
+            process = new_robot(tmp_path / 'robot.yaml', domain, '--wait', wait)
+            _, said = process.communicate(timeout=120)
+            assert process.returncode == 2
+            assert f'no message of a known type within {wait} s' in said
+            assert len(said.strip().splitlines()) == 1
+            if 'silent: node /compiling' in said:
+                break
+        compiling.destroy_node()
+    assert 'silent: node /compiling' in said
     assert not (tmp_path / 'robot.yaml').exists()

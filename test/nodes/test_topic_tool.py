@@ -5,14 +5,17 @@ import subprocess
 import sys
 
 import pytest
+import yaml
 from harness.compensation import LIVE
 from harness.pages import blocks_of
 from harness.processes import free_domain, graph_environment, node_process
+from harness.spin_nodes import ros_context
 from paths import ROOT
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool
 
 from seal_friction_ros.nodes import topic_tool
+from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 from seal_friction_ros.nodes.topic_tool import filled, for_reading, plain
 from seal_friction_ros.offline.commands import topics
 from seal_friction_ros.offline.commands.main import main
@@ -40,9 +43,10 @@ def tool(domain, monkeypatch, capsys):
     """The command without its processes: gives the exit code, and what was printed."""
     monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
 
-    def run_task(task: list[str], *, check: bool) -> subprocess.CompletedProcess:
+    def run_task(task: list[str], *, stdout: int | None = None, **_: bool) -> subprocess.CompletedProcess:
         monkeypatch.setattr(sys, 'argv', task[2:])
-        return subprocess.CompletedProcess(task, topic_tool.main())
+        code = topic_tool.main()
+        return subprocess.CompletedProcess(task, code, capsys.readouterr().out if stdout else None)
 
     def run_here(*arguments: str) -> tuple[int, str]:
         monkeypatch.setattr(topics.subprocess, 'run', run_task)
@@ -116,6 +120,24 @@ def test_param_sets_what_the_node_accepts_and_says_why_it_refuses(tool):
     assert f'did you mean {name}?' in said
 
 
+def test_param_saves_what_was_tuned_live_and_the_next_node_takes_it(tool, tmp_path):
+    path, name = tmp_path / 'tuned.yaml', 'feedforward.lead_time'
+    assert tool('param', 'friction_estimator', name, '0.0045')[0] == 0
+    code, said = tool('param', 'friction_estimator', '--save', str(path))
+    assert code == 0, said
+    with ros_context() as context:
+        node = FrictionEstimator(context=context, cli_args=['--ros-args', '--params-file', str(path)])
+        assert node.get_parameter(name).value == 0.0045
+        node.destroy_node()
+    (parameters,) = (part['ros__parameters'] for part in yaml.safe_load(path.read_text()).values())
+    assert set(parameters) > {'feedforward.scale', 'adaptation.mode', 'stick_velocity'}
+    assert not {'seals', 'record', 'use_sim_time'} & set(parameters)
+    path.write_text('my own\n')
+    code, said = tool('param', 'friction_estimator', '--save', str(path))
+    assert (code, path.read_text()) == (2, 'my own\n')
+    assert 'not overwriting' in said
+
+
 def test_call_finds_the_type_of_a_service_and_a_refusal_is_exit_code_1(tool):
     code, said = tool('call', 'friction_estimator/stop_recording', '--json')
     assert code == 1
@@ -125,7 +147,9 @@ def test_call_finds_the_type_of_a_service_and_a_refusal_is_exit_code_1(tool):
     assert 'has no field data' in said
 
 
-def test_every_command_of_the_docs_runs(tool):
+def test_every_command_of_the_docs_runs(tool, tmp_path, monkeypatch):
+    (tmp_path / 'build').mkdir()
+    monkeypatch.chdir(tmp_path)
     (block,) = (b for b in blocks_of(ROOT / 'docs' / 'interfaces.md') if b.kind == 'topics')
     for line in block.text.splitlines():
         code, said = tool(*line.removeprefix('seal_friction topics ').split())

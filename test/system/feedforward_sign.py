@@ -35,6 +35,7 @@ from seal_friction_ros.files import read_yaml
 
 SAMPLES = 30
 MS = 1_000_000  # [ns]
+LIMITS = EstimatorSettings()
 
 
 @cache
@@ -122,9 +123,13 @@ def violations(seed: int) -> list[str]:
             Velocity(stamp, velocity),
         ):
             receive(parameters, state, message, stamp, take)
+        if not forces:
+            if abs(velocity) <= LIMITS.velocity_max and abs(acceleration) <= LIMITS.acceleration_max:
+                wrong.append(f'case {seed}, sample {i}: no feed-forward')
+            continue  # a reference out of range is none
         if forces[-1] * velocity < 0.0 or (scale == 0.0 and forces[-1] != 0.0):
             wrong.append(f'case {seed}, sample {i}: {forces[-1]} N at {velocity} m/s, scale {scale}')
-    if scale > 0.1 and settings.lead_time < 1e-4 and not any(forces):
+    if forces and scale > 0.1 and settings.lead_time < 1e-4 and not any(forces):
         wrong.append(f'case {seed}: no force at all')
     return wrong
 

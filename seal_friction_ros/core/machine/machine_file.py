@@ -159,6 +159,7 @@ class Output:
     gain: float = 1.0
     index: int = 0  # in a Float64MultiArray
     joint: str = ''  # in a JointState
+    frame: str = ''  # of a WrenchStamped
 
 
 @dataclass(frozen=True)
@@ -207,7 +208,11 @@ _TOPIC = re.compile(r'/[A-Za-z_]\w*(/[A-Za-z_]\w*)*')
 _TYPE = re.compile(r'[a-z]\w*(/msg)?/[A-Z]\w*')
 _NAME = re.compile(r'[a-z]\w*', re.IGNORECASE)
 ANSWERS = ('each', 'together')
-_OUTPUT_TYPES = ('std_msgs/Float64MultiArray', 'sensor_msgs/JointState', 'std_msgs/Float64')
+_OUTPUT_TYPES = (
+    'std_msgs/Float64MultiArray', 'sensor_msgs/JointState', 'geometry_msgs/WrenchStamped', 'std_msgs/Float64',
+)  # fmt: skip
+_OUTPUT_NAMES = {'joint': 'sensor_msgs/JointState', 'frame': 'geometry_msgs/WrenchStamped'}
+"""Key of an output -> the type that needs it; no other type has it."""
 _GROUPS = (
     ParameterGroup(EstimatorSettings),
     ParameterGroup(FeedForwardSettings, FEEDFORWARD_PREFIX),
@@ -449,19 +454,22 @@ def _differentiator(document: Mapping[str, Any], inputs: Mapping[str, Source], w
 
 
 def _output(document: Any, where: str) -> Output:
-    _check_names(document, ('topic', 'type', 'gain', 'index', 'joint'), where)
+    _check_names(document, ('topic', 'type', 'gain', 'index', *_OUTPUT_NAMES), where)
     topic, kind = _text(document, 'topic', where), short_name(_text(document, 'type', where))
     if not _TOPIC.fullmatch(topic):
         raise ValueError(f'{where}.topic = {topic!r} is not a topic: write it as /boom/effort')
     if kind not in _OUTPUT_TYPES:
         raise ValueError(f'{where}.type = {kind!r} is not one of {", ".join(_OUTPUT_TYPES)}')
-    index, joint = document.get('index', 0), document.get('joint', '')
+    index = document.get('index', 0)
     if type(index) is not int or not 0 <= index < 256 or (index and kind != 'std_msgs/Float64MultiArray'):
         raise ValueError(f'{where}.index = {index!r} is not 0 to 255, for a Float64MultiArray')
-    is_state = kind == 'sensor_msgs/JointState'
-    if not isinstance(joint, str) or not joint.isprintable() or bool(joint) != is_state:
-        raise ValueError(f'{where}.joint = {joint!r}: name the joint of a JointState, and of no other type')
-    return Output(topic, kind, _number(document.get('gain', 1.0), 'number', f'{where}.gain'), index, joint)
+    names = {key: document.get(key, '') for key in _OUTPUT_NAMES}
+    for key, name in names.items():
+        if not isinstance(name, str) or not name.isprintable() or bool(name) != (kind == _OUTPUT_NAMES[key]):
+            told = f'name the {key} of a {_OUTPUT_NAMES[key].partition("/")[2]}, and of no other type'
+            raise ValueError(f'{where}.{key} = {name!r}: {told}')
+    gain = _number(document.get('gain', 1.0), 'number', f'{where}.gain')
+    return Output(topic=topic, type_name=kind, gain=gain, index=index, **names)
 
 
 def _settings(document: Any, where: str) -> dict[type, Any]:

@@ -4,7 +4,10 @@ Beside the message of this project, a command goes out as
 
 - the effort of a joint in a ``sensor_msgs/JointState``,
 - one number of a ``std_msgs/Float64MultiArray``, where all actuators with the same topic share one message,
+- the force along x of a frame in a ``geometry_msgs/WrenchStamped``,
 - a ``std_msgs/Float64``.
+
+The second and the last have no stamp, so a controller cannot see how old such a command is.
 
 A command is ``gain`` times the force: 1 for an effort [N], else units of the command per newton, for controllers that
 take a position, a velocity or a valve command. A command is 0 exactly where the force is 0.
@@ -16,11 +19,11 @@ from typing import NamedTuple
 
 from seal_friction_ros.core.machine.machine import Machine, MachineState
 from seal_friction_ros.core.machine.machine_file import MachineFile, Output
-from seal_friction_ros.core.messages.coder import encode_efforts, encode_number, encode_numbers
+from seal_friction_ros.core.messages.coder import encode_efforts, encode_number, encode_numbers, encode_wrench
 from seal_friction_ros.core.messages.definitions import short_name
-from seal_friction_ros.core.messages.layouts import NUMBER_TYPE, NUMBERS_TYPE
+from seal_friction_ros.core.messages.layouts import NUMBER_TYPE, NUMBERS_TYPE, WRENCH_TYPE
 
-_NUMBER, _NUMBERS = short_name(NUMBER_TYPE), short_name(NUMBERS_TYPE)
+_NUMBER, _NUMBERS, _WRENCH = map(short_name, (NUMBER_TYPE, NUMBERS_TYPE, WRENCH_TYPE))
 
 
 class Command(NamedTuple):
@@ -79,6 +82,8 @@ def _encoded(parts: list[tuple[Output, float]], stamp: int) -> bytes:
     kind = parts[0][0].type_name
     if kind == _NUMBER:
         return encode_number(parts[0][1])
+    if kind == _WRENCH:
+        return encode_wrench(stamp, parts[0][0].frame, parts[0][1])
     if kind == _NUMBERS:
         values = [0.0] * (1 + max(output.index for output, _ in parts))
         for output, command in parts:

@@ -153,3 +153,10 @@ def encode_efforts(stamp: int, efforts: Sequence[tuple[str, float]]) -> bytes:
     layout = struct_of(layouts.JOINTS_TYPE, 1, count, *lengths, 0, 0, count)
     head = (*divmod(stamp, SECOND), 1, b'')
     return layout.pack(ENCAPSULATION, *head, count, *texts, 0, 0, count, *(effort for _, effort in efforts))
+
+
+def encode_wrench(stamp: int, frame: str, force: float) -> bytes:
+    """A ``geometry_msgs/WrenchStamped`` with a force along x of a frame, no torque; ``stamp``: [ns]."""
+    name = frame.encode()
+    layout = struct_of(layouts.WRENCH_TYPE, len(name) + 1)
+    return layout.pack(ENCAPSULATION, *divmod(stamp, SECOND), len(name) + 1, name, force, *[0.0] * 5)

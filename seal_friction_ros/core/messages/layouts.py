@@ -32,7 +32,7 @@ TEMPERATURE_TYPE = 'sensor_msgs/msg/Temperature'
 CLOCK_TYPE = 'rosgraph_msgs/msg/Clock'
 NEWEST_TYPE = 'std_msgs/msg/UInt8MultiArray'
 NUMBER_TYPE, NUMBERS_TYPE = 'std_msgs/msg/Float64', 'std_msgs/msg/Float64MultiArray'
-JOINTS_TYPE = 'sensor_msgs/msg/JointState'
+JOINTS_TYPE, WRENCH_TYPE = 'sensor_msgs/msg/JointState', 'geometry_msgs/msg/WrenchStamped'
 
 CLOCK_TOPIC = '/clock'  # Simulated time, an input of nodes with ``use_sim_time``.
 
@@ -114,6 +114,9 @@ _OTHERS: dict[str, dict[str, str]] = {
         'header': 'std_msgs/Header', 'name': 'string[]', 'position': 'float64[]', 'velocity': 'float64[]',
         'effort': 'float64[]',
     },
+    'geometry_msgs/Vector3': dict.fromkeys('xyz', 'float64'),
+    'geometry_msgs/Wrench': dict.fromkeys(('force', 'torque'), 'geometry_msgs/Vector3'),
+    WRENCH_TYPE: {'header': 'std_msgs/Header', 'wrench': 'geometry_msgs/Wrench'},
     MACHINE_TYPE: {
         'header': 'std_msgs/Header', 'estimated': 'string[]', 'estimates': f'{PACKAGE}/FrictionEstimate[]',
         'fed_forward': 'string[]', 'feedforwards': f'{PACKAGE}/FrictionFeedForward[]',

@@ -7,7 +7,7 @@ import math
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.util import find_spec
@@ -65,8 +65,11 @@ class _Topic:
             self.previous[path] = value
 
 
-def new_machine(bag: Path) -> str:
-    """Text of a mapping file for the machine in a bag; BagError if it cannot be read, or holds no joint."""
+def new_machine(bag: Path, silent: Sequence[str] = ()) -> str:
+    """Text of a mapping file for the machine in a bag; BagError if it cannot be read, or holds no joint.
+
+    ``silent`` are topics and nodes that were there but sent nothing.
+    """
     everything = _look(bag)
     found = {topic: one for topic, one in everything.items() if one.kind in KNOWN}
     joints = {topic: one for topic, one in found.items() if one.kind == JOINT_STATE and one.names}
@@ -81,6 +84,7 @@ def new_machine(bag: Path) -> str:
         'topics:',
     ]
     lines += [f'  {topic}: {one.kind.replace("/", "/msg/")}{_said(one)}' for topic, one in sorted(found.items())]
+    lines += [f'  # missing: {what} is there but silent' for what in silent]
     lines += ['ambient_pressure: 101325.0  # [Pa] guess: sea level', 'actuators:']
     joints_of = {name: topic for topic, one in measured.items() for name in one.names}
     actuators = {name: topic for name, topic in joints_of.items() if measured[topic].moves(name)} or joints_of
@@ -110,8 +114,10 @@ def _candidates(found: dict[str, _Topic], lines: list[str]) -> list[str]:
 
 
 @contextmanager
-def recorded_topics(seconds: float, wait: float) -> Iterator[Path]:
-    """Bag with what the topics of the machine show for ``seconds`` [s]; it is gone after the ``with`` block.
+def recorded_topics(seconds: float, wait: float) -> Iterator[tuple[Path, list[str]]]:
+    """Bag with what the topics of the machine show for ``seconds`` [s], and what is silent.
+
+    The bag is gone after the ``with`` block.
 
     Another process listens, so that this one needs no ROS. It waits ``wait`` [s] at most for the first message.
     BagError if ROS 2 is not installed, or no topic of a known type has a message.
@@ -127,7 +133,7 @@ def recorded_topics(seconds: float, wait: float) -> Iterator[Path]:
         if recorder.returncode:
             said = recorder.stderr.strip().splitlines() or ['the process that listens ended early']
             raise BagError(f'--from-topics: {said[-1].removeprefix("topic_recorder: ")}')
-        yield bag
+        yield bag, [line for line in recorder.stdout.splitlines() if line]
 
 
 def _look(bag: Path) -> dict[str, _Topic]:

@@ -44,8 +44,8 @@ def run_robot(arguments: argparse.Namespace) -> int:
     if arguments.from_bag:
         text = new_machine(arguments.from_bag)
     else:
-        with recorded_topics(arguments.from_topics, arguments.wait) as bag:
-            text = new_machine(bag)
+        with recorded_topics(arguments.from_topics, arguments.wait) as (bag, silent):
+            text = new_machine(bag, silent)
     return _written(arguments, text, lambda: {'actuators': _actuators(arguments.out)})
 
 

@@ -369,6 +369,8 @@ def test_an_encoder_that_cannot_be_is_refused(values, complaint):
         ({'output': {'topic': '/x', 'type': 'std_msgs/msg/Float64', 'joint': 'j'}}, 'and of no other type'),
         ({'output': {'topic': '/x', 'type': 'sensor_msgs/msg/JointState', 'joint': 'a\nb'}}, 'name the joint'),
         ({'output': {'topic': '/x', 'type': 'sensor_msgs/msg/JointState', 'joint': 5}}, 'name the joint'),
+        ({'output': {'topic': '/x', 'type': 'geometry_msgs/msg/WrenchStamped'}}, 'name the frame of a WrenchStamped'),
+        ({'output': {'topic': '/x', 'type': 'std_msgs/msg/Float64', 'frame': 'rod'}}, 'and of no other type'),
         ({'output': {'topic': '/x', 'type': 'std_msgs/msg/Float64', 'gain': '1 N'}}, "unit 'N' is none of a number"),
         ({'parameters': 5}, 'parameters is not a mapping'),
     ],

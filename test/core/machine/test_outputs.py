@@ -33,6 +33,14 @@ def test_the_effort_of_a_joint(joint):
     assert state.header.stamp.sec * 10**9 + state.header.stamp.nanosec == STAMP
 
 
+@pytest.mark.parametrize('frame', ['rod', 'boom_link', 'seven77'])
+def test_the_force_along_x_of_a_frame_has_the_stamp_that_tells_its_age(frame):
+    output = {'topic': '/wrench', 'type': 'geometry_msgs/msg/WrenchStamped', 'frame': frame, 'gain': -2.0}
+    found = read(commands(parsed(EXCAVATOR, output=output), {'boom': 3.0}, STAMP)[0])
+    assert (found.wrench.force.x, found.wrench.force.y, found.wrench.torque.z) == (-6.0, 0.0, 0.0)
+    assert (found.header.frame_id, found.header.stamp.sec * 10**9 + found.header.stamp.nanosec) == (frame, STAMP)
+
+
 def test_a_number_in_units_of_the_command():
     output = {'topic': '/valve', 'type': 'std_msgs/msg/Float64', 'gain': 1e-3}
     assert read(commands(parsed(EXCAVATOR, output=output), {'boom': 3.0}, STAMP)[0]).data == pytest.approx(3e-3)
@@ -80,6 +88,11 @@ def test_actuators_with_places_of_their_own_are_accepted():
     check_outputs(parsed(EXCAVATOR, output=None))
     check_outputs(parsed(EXCAVATOR, output={'topic': '/other', 'type': 'std_msgs/msg/Float64'}))
     check_outputs(joints('one', 'two', 'three'))
+    document = yaml.safe_load(EXCAVATOR)
+    for name, actuator in document['actuators'].items():
+        actuator['output'] = {'topic': '/wrench', 'type': 'geometry_msgs/msg/WrenchStamped', 'frame': name}
+    with pytest.raises(ValueError, match='arm and boom have the same place in /wrench'):
+        check_outputs(parse_machine(document, 'robot.yaml'))
     with pytest.raises(ValueError, match='arm and boom have the same place in /command'):
         check_outputs(joints('one', 'one'))
     with pytest.raises(ValueError, match='bucket and arm have the same place'):
