@@ -34,17 +34,17 @@ from seal_friction_ros.offline.replay.answer_comparison import ReplayResult
 from seal_friction_ros.offline.replay.parallel_replay import replay_many, verify_shared
 from seal_friction_ros.offline.replay.replay import replay
 
-SAMPLES = 2000  # 100 a second
+SAMPLES = 1000  # 100 a second
 STATE = '/friction_estimator/state'
 
 
 @pytest.fixture(scope='module')
 def recorded(tmp_path_factory) -> Path:
-    """20 s of an adapting estimator, a state every second."""
+    """10 s of an adapting estimator, a state every half second."""
     folder = tmp_path_factory.mktemp('shared')
     configuration = dataclasses.replace(compensating(), adaptation=AdaptationSettings('on'))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(replay_module, 'STATE_PERIOD', 1.0)
+        patch.setattr(replay_module, 'STATE_PERIOD', 0.5)
         replay(write_inputs(folder / 'inputs', SAMPLES, configuration), out=folder / 'replayed')
     return rewrite(folder / 'replayed', folder / 'recorded', lambda _, message: as_recorded(message))
 
@@ -165,7 +165,7 @@ def test_answers_that_lack_just_before_a_state_is_a_difference(recorded: Path, t
 
 
 def test_a_bag_of_several_files_is_shared_too(recorded: Path, tmp_path: Path):
-    with BagWriter(tmp_path / 'bag', split_size=100_000) as writer:
+    with BagWriter(tmp_path / 'bag', split_size=50_000) as writer:
         for message in read_messages(recorded):
             writer.write(*message)
     assert len(storage(tmp_path / 'bag').files) > 5
@@ -211,7 +211,7 @@ def read(bag: Path, stretch: Stretch | None = None) -> list[tuple[int, bytes]]:
 
 
 def test_stretches_of_a_bag_hold_each_of_its_messages_once(recorded: Path, tmp_path: Path):
-    with BagWriter(tmp_path / 'bag', split_size=100_000) as writer:
+    with BagWriter(tmp_path / 'bag', split_size=50_000) as writer:
         for message in read_messages(recorded):
             writer.write(*message)
     files, end = len(storage(tmp_path / 'bag').files), LAST_TIME + 1
