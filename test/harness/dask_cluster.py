@@ -14,7 +14,11 @@ from paths import ROOT
 
 PATIENCE = 60.0  # [s] for a process of Dask to start, beside busy ones
 ONE_THREAD = dict.fromkeys(('OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS', 'OMP_NUM_THREADS'), '1')
-ENVIRONMENT = {**os.environ, **ONE_THREAD, 'PYTHONPATH': str(ROOT / 'test')}
+IDLE = {  # a worker that waits looks at itself a hundred times a second, half of the time that it takes
+    'DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED': 'False',
+    'DASK_DISTRIBUTED__ADMIN__SYSTEM_MONITOR__INTERVAL': '10s',
+}
+ENVIRONMENT = {**os.environ, **ONE_THREAD, **IDLE, 'PYTHONPATH': str(ROOT / 'test')}
 """of everything here"""
 
 

@@ -53,6 +53,12 @@ def message(place: Stage) -> str:
     return str(place.estimator.diagnostics()['estimate'].message)
 
 
+def unless_alone(place: Stage) -> list[str]:
+    """Wait until no topic has several publishers: one that was destroyed may be heard of for some time."""
+    alone = place.spin_until(lambda: 'several publishers' not in message(place))
+    return unless(alone, f'named although it is gone: {message(place)}')
+
+
 def best_effort_publisher(place: Stage) -> str | None:
     """Node whose velocity is taken with best effort, according to the diagnostics."""
     values = {value.key: value.value for value in place.estimator.diagnostics()['estimate'].values}
@@ -116,8 +122,7 @@ def second_publisher(chance: random.Random, folder: Path, *, refuse: bool = True
                     wrong += unless(statuses(during) == {0}, f'{statuses(during)}') + unless(level == 'WARN', level)
                 wrong += broken_invariants(place.driver.outputs)
                 place.restart()  # inputs are refused after a restart, too
-        wrong += unless(place.spin_until(lambda: 'several' not in message(place)), 'named although it is gone')
-        return wrong + unrecovered(place)
+        return wrong + unless_alone(place) + unrecovered(place)
 
 
 def second_publisher_allowed(chance: random.Random, folder: Path) -> list[str]:
@@ -150,14 +155,14 @@ def incompatible_quality(chance: random.Random, folder: Path) -> list[str]:
             found = best_effort_publisher(place)
             wrong += unless(found == '/driver', f'best effort taken from {found}')
         place.connect()
-        wrong += unrecovered(place)
+        wrong += unless_alone(place) + unrecovered(place)
         for quality, wanted in ((qos.STREAM, None), (qos_profile_sensor_data, '/driver')):
             place.driver.destroy_publisher(place.driver.inputs['rod_velocity'])
             place.driver.inputs['rod_velocity'] = place.driver.create_publisher(RodVelocity, 'rod_velocity', quality)
             found = place.spin_until(lambda wanted=wanted: best_effort_publisher(place) == wanted)
             wrong += unless(found, f'best effort from {best_effort_publisher(place)}, not {wanted}')
             place.connect()
-            wrong += unrecovered(place)
+            wrong += unless_alone(place) + unrecovered(place)
         return wrong
 
 
@@ -176,8 +181,7 @@ def second_estimator(chance: random.Random, folder: Path) -> list[str]:
                 twin.finish()
                 twin.destroy_node()
         wrong += unless(statuses(during) == {Status.INPUT_REFUSED}, f'{statuses(during)}')
-        gone = place.spin_until(lambda: 'several' not in message(place))
-        return wrong + unless(gone, 'named although it is gone') + unrecovered(place)
+        return wrong + unless_alone(place) + unrecovered(place)
 
 
 def parameters_change(chance: random.Random, folder: Path) -> list[str]:

@@ -34,22 +34,23 @@ from seal_friction_ros.offline.replay.answer_comparison import ReplayResult
 from seal_friction_ros.offline.replay.parallel_replay import replay_many, verify_shared
 from seal_friction_ros.offline.replay.replay import replay
 
-SAMPLES = 2000  # 100 a second
+SAMPLES = 1000  # 100 a second
 STATE = '/friction_estimator/state'
 
 
 @pytest.fixture(scope='module')
 def recorded(tmp_path_factory) -> Path:
-    """20 s of an adapting estimator, a state every second."""
+    """10 s of an adapting estimator, a state every half second."""
     folder = tmp_path_factory.mktemp('shared')
     configuration = dataclasses.replace(compensating(), adaptation=AdaptationSettings('on'))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(replay_module, 'STATE_PERIOD', 1.0)
+        patch.setattr(replay_module, 'STATE_PERIOD', 0.5)
         replay(write_inputs(folder / 'inputs', SAMPLES, configuration), out=folder / 'replayed')
     return rewrite(folder / 'replayed', folder / 'recorded', lambda _, message: as_recorded(message))
 
 
 def shared(bag: Path) -> ReplayResult | None:
+    """In seven stretches: every third state ends one."""
     return shared_replay.verify_stretches(bag, find_topics(bag), 2)
 
 
@@ -116,17 +117,16 @@ def older(message: BagMessage) -> BagMessage:
         (ESTIMATE_TYPE, 700, other_byte),
         (ESTIMATE_TYPE, 700, lambda _: None),
         (FORCE_TYPE, 700, lambda _: None),
-        (STATE_TYPE, 10, other_learnt),
-        (STATE_TYPE, 10, older),
-        (STATE_TYPE, 10, lambda message: message._replace(data=encode_text('{}'))),
-        (STATE_TYPE, 10, lambda message: message._replace(data=b'')),
+        (STATE_TYPE, 9, other_learnt),
+        (STATE_TYPE, 9, older),
+        (STATE_TYPE, 9, lambda message: message._replace(data=encode_text('{}'))),
+        (STATE_TYPE, 9, lambda message: message._replace(data=b'')),
     ],
 )
 def test_nothing_is_concluded_from_stretches_that_differ_or_do_not_fit(
     recorded: Path, tmp_path: Path, type_name: str, number: int, change, monkeypatch
 ):
     bag = rewrite(recorded, tmp_path / 'bag', nth(type_name, number, change))
-    monkeypatch.setattr(shared_replay, 'STRETCHES', 20)
     assert shared(bag) is None
     alone = replay(bag)
     assert alone.identical == (type_name == STATE_TYPE)
@@ -134,7 +134,7 @@ def test_nothing_is_concluded_from_stretches_that_differ_or_do_not_fit(
     assert replay_many([bag], workers=2)[0].result == alone  # in one go
 
 
-def test_an_answer_beyond_a_state_is_no_answer_to_its_stretch(recorded: Path, tmp_path: Path, monkeypatch):
+def test_an_answer_beyond_a_state_is_no_answer_to_its_stretch(recorded: Path, tmp_path: Path):
     """Every answer is there, one of them after the state that follows it: only one go can tell."""
     messages = list(read_messages(recorded))
     place = [i for i, message in enumerate(messages) if message.topic == STATE][5]
@@ -145,11 +145,10 @@ def test_an_answer_beyond_a_state_is_no_answer_to_its_stretch(recorded: Path, tm
         for message in messages:
             writer.write(*message)
     assert replay(tmp_path / 'bag').identical
-    monkeypatch.setattr(shared_replay, 'STRETCHES', 20)
     assert shared(tmp_path / 'bag') is None
 
 
-def test_answers_that_lack_just_before_a_state_is_a_difference(recorded: Path, tmp_path: Path, monkeypatch):
+def test_answers_that_lack_just_before_a_state_is_a_difference(recorded: Path, tmp_path: Path):
     """At the end of a bag the last answer may lack, since a recording may stop there; amid a bag it may not."""
     messages = list(read_messages(recorded))
     place = [i for i, message in enumerate(messages) if message.topic == STATE][5]
@@ -159,13 +158,12 @@ def test_answers_that_lack_just_before_a_state_is_a_difference(recorded: Path, t
     with BagWriter(tmp_path / 'bag') as writer:
         for message in messages:
             writer.write(*message)
-    monkeypatch.setattr(shared_replay, 'STRETCHES', 20)
     assert shared(tmp_path / 'bag') is None
     assert replay(tmp_path / 'bag').differing == 2
 
 
 def test_a_bag_of_several_files_is_shared_too(recorded: Path, tmp_path: Path):
-    with BagWriter(tmp_path / 'bag', split_size=100_000) as writer:
+    with BagWriter(tmp_path / 'bag', split_size=50_000) as writer:
         for message in read_messages(recorded):
             writer.write(*message)
     assert len(storage(tmp_path / 'bag').files) > 5
@@ -211,7 +209,7 @@ def read(bag: Path, stretch: Stretch | None = None) -> list[tuple[int, bytes]]:
 
 
 def test_stretches_of_a_bag_hold_each_of_its_messages_once(recorded: Path, tmp_path: Path):
-    with BagWriter(tmp_path / 'bag', split_size=100_000) as writer:
+    with BagWriter(tmp_path / 'bag', split_size=50_000) as writer:
         for message in read_messages(recorded):
             writer.write(*message)
     files, end = len(storage(tmp_path / 'bag').files), LAST_TIME + 1

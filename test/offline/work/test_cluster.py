@@ -47,6 +47,13 @@ def cluster(tmp_path_factory) -> Iterator[DaskCluster]:
         yield running
 
 
+@pytest.fixture(scope='module')
+def doomed(tmp_path_factory) -> Iterator[DaskCluster]:
+    """A cluster whose processes tests may kill: a worker, and at last the scheduler."""
+    with dask_cluster(tmp_path_factory.mktemp('doomed')) as running:
+        yield running
+
+
 def started(*words: str, folder: Path = ROOT) -> subprocess.Popen[str]:
     return subprocess.Popen(
         words, cwd=folder, env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -209,16 +216,15 @@ def test_of_calls_for_one_result_the_first_error_counts_and_a_bug_is_seen(cluste
 # -- what ends amid work ----------------------------------------------------------------------------------------------
 
 
-def test_a_worker_that_is_killed_amid_work_costs_time_only(tmp_path):
-    with dask_cluster(tmp_path / 'cluster') as cluster:
-        expression = "run_all('', [partial(calls.square_once_open, folder, number) for number in range(5)], workers)"
-        running = started(*program(expression, cluster.address, tmp_path))
-        wait_for(lambda: len(begun(tmp_path)) == 2)
-        killed = begun(tmp_path)[0]
-        next(worker for worker in cluster.workers if worker.pid == killed[1]).kill()
-        for number in range(5):
-            (tmp_path / f'open {number}').touch()
-        out, errors = running.communicate(timeout=120.0)
+def test_a_worker_that_is_killed_amid_work_costs_time_only(doomed, tmp_path):
+    expression = "run_all('', [partial(calls.square_once_open, folder, number) for number in range(5)], workers)"
+    running = started(*program(expression, doomed.address, tmp_path))
+    wait_for(lambda: len(begun(tmp_path)) == 2)
+    killed = begun(tmp_path)[0]
+    next(worker for worker in doomed.workers if worker.pid == killed[1]).kill()
+    for number in range(5):
+        (tmp_path / f'open {number}').touch()
+    out, errors = running.communicate(timeout=120.0)
     assert running.returncode == 0, errors
     assert json.loads(out) == [{'square': number**2} for number in range(5)]
     (again,) = [process for number, process in begun(tmp_path)[1:] if number == killed[0]]
@@ -237,18 +243,17 @@ def test_a_call_that_ends_every_worker_has_crashed_and_costs_its_own_result_only
     assert other == [{'square': 4}, '']
 
 
-def test_a_scheduler_that_is_killed_ends_in_one_line_and_finished_parts_are_not_computed_again(tmp_path):
+def test_a_scheduler_that_is_killed_ends_in_one_line_and_finished_parts_are_not_computed_again(doomed, tmp_path):
     parts = "[Part(f'key{n}', ('square',), partial(calls.square_once_open, folder, n)) for n in range(4)]"
     expression = f"run_parts('', {parts}, workers, folder / 'work')"
     for number in (0, 1):
         (tmp_path / f'open {number}').touch()
-    with dask_cluster(tmp_path / 'cluster') as cluster:
-        running = started(*program(expression, cluster.address, tmp_path))
-        wait_for(lambda: (tmp_path / 'work' / 'key0.json').exists() and (tmp_path / 'work' / 'key1.json').exists())
-        cluster.scheduler.kill()
-        _, errors = running.communicate(timeout=120.0)
+    running = started(*program(expression, doomed.address, tmp_path))
+    wait_for(lambda: (tmp_path / 'work' / 'key0.json').exists() and (tmp_path / 'work' / 'key1.json').exists())
+    doomed.scheduler.kill()
+    _, errors = running.communicate(timeout=120.0)
     assert running.returncode == 1
-    assert last_line(errors).startswith(f'{cluster.address}: the scheduler has gone before the work was done')
+    assert last_line(errors).startswith(f'{doomed.address}: the scheduler has gone before the work was done')
     for number in (2, 3):
         (tmp_path / f'open {number}').touch()
     (tmp_path / 'begun').unlink()
@@ -317,27 +322,31 @@ def test_an_address_where_nobody_answers_is_one_line(tmp_path):
     assert 'no Dask scheduler answers within 2 s' in refused(address, tmp_path)
 
 
-@pytest.mark.parametrize(
-    ('options', 'said'),
-    [
-        (['--scheduler', 'garbage'], "'garbage' is no address of a scheduler: write tcp://HOST:PORT"),
-        (['--scheduler', 'tcp://127.0.0.1:99999'], 'is no address of a scheduler'),
-        (['--scheduler', 'inproc://a:1'], 'is no address of a scheduler'),
-        (['--scheduler', 'tcp://a\nb:1'], 'is no address of a scheduler'),
-        (['--scheduler', ''], "'' is no address of a scheduler"),
-        (['--scheduler', 'tls://127.0.0.1:1'], 'belong together'),
-        (['--scheduler', 'tls://127.0.0.1:1', '--scheduler-tls', 'a', 'b', 'c'], 'a: no such file'),
-        (['--scheduler-tls', 'a', 'b', 'c'], '--scheduler-tls is only for a --scheduler'),
-        (['--retry-failed'], '--retry-failed is only for a --work FOLDER'),
-    ],
-)
-def test_options_that_make_no_sense_are_one_line_and_load_no_dask(options, said):
-    words = ['replay', 'bags/pull_test', 'bags/faults', *options]
-    check = 'import sys; from seal_friction_ros.offline.commands.main import main; code = main(sys.argv[1:]); '
-    check += "sys.exit(99 if {'dask', 'distributed'} & set(sys.modules) else code)"
-    code, out, errors = done(sys.executable, '-c', check, *words)
-    assert (code, out) == (2, '')
-    assert said in last_line(errors)
+SENSELESS = [
+    (['--scheduler', 'garbage'], "'garbage' is no address of a scheduler: write tcp://HOST:PORT"),
+    (['--scheduler', 'tcp://127.0.0.1:99999'], 'is no address of a scheduler'),
+    (['--scheduler', 'inproc://a:1'], 'is no address of a scheduler'),
+    (['--scheduler', 'tcp://a\nb:1'], 'is no address of a scheduler'),
+    (['--scheduler', ''], "'' is no address of a scheduler"),
+    (['--scheduler', 'tls://127.0.0.1:1'], 'belong together'),
+    (['--scheduler', 'tls://127.0.0.1:1', '--scheduler-tls', 'a', 'b', 'c'], 'a: no such file'),
+    (['--scheduler-tls', 'a', 'b', 'c'], '--scheduler-tls is only for a --scheduler'),
+    (['--retry-failed'], '--retry-failed is only for a --work FOLDER'),
+]
+"""Options, and what is said to them."""
+EACH = """
+import json, sys
+from seal_friction_ros.offline.commands.main import main
+codes = [main(['replay', 'bags/pull_test', 'bags/faults', *options]) for options in json.loads(sys.argv[1])]
+print(json.dumps([codes, sorted({'dask', 'distributed'} & set(sys.modules))]))
+"""
+
+
+def test_options_that_make_no_sense_are_one_line_and_load_no_dask():
+    code, out, errors = done(sys.executable, '-c', EACH, json.dumps([options for options, _ in SENSELESS]))
+    assert (code, json.loads(out)) == (0, [[2] * len(SENSELESS), []])
+    for line, (options, said) in zip(errors.splitlines(), SENSELESS, strict=True):
+        assert said in line, options
 
 
 @pytest.mark.long
