@@ -300,7 +300,7 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
     missing = [name for name in ('pressure', 'force') if not getattr(topics, name)]
     if missing:
         raise ValueError(f'{path}: no {" and no ".join(missing)} messages: they are needed to identify friction')
-    stamp, received, columns, configuration = read_velocity_rows(bag)
+    stamp, received, columns, configuration, unread = read_velocity_rows(bag)
     chambers, document, holds_load, has_placeholder = None, None, False, False
     if configuration is not None:
         holds_load = configuration.parameters().estimator.force_sum_correction.contains_load
@@ -309,10 +309,13 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
     order = admission.in_order(stamp, received)
     columns[~(np.abs(columns) < 1e15)] = np.nan  # [SI] no measurement is as large
     columns = columns[:, order.rows]
+    early = int(np.argmax(np.isfinite(columns[1:4]).all(axis=0)))  # rows before the first pressures and force sum
+    columns, seconds = columns[:, early:], order.seconds[early:]
     temperature = _from_the_first(columns[5] + ZEROS['degC']) if topics.temperature else None
     position = columns[4] if topics.position else None
-    dropped = {admission.SAME_STAMP: order.same_stamp} if order.same_stamp else {}
-    signals, sliding = Signals(order.seconds, *columns[:4]), _sliding(Sliding(), options)
+    dropped = {**unread, admission.SAME_STAMP: order.same_stamp, admission.NOT_STARTED: early}
+    dropped = {reason: count for reason, count in dropped.items() if count}
+    signals, sliding = Signals(seconds, *columns[:4]), _sliding(Sliding(), options)
     log, texts = _admitted(RecordedLog(bag.name, signals, sliding, temperature, position, dropped))
     return Source(
         _data_file(path),
