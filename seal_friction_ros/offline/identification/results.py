@@ -174,9 +174,7 @@ def seal_document(
     """Seal file of a kind of seals by the selected law, or by that for the ``settled`` seal, checked as by the node.
 
     The standard deviation is its share of that of all seals together, also at pressures that were not driven.
-
-    Raises:
-        ValueError: The law makes no valid seal.
+    ValueError: the law makes no valid seal.
     """
     seals, law, kind = len(data.sources.chambers), selection.law, data.kinds[number]
     values = rounded_numbers(law.of_one_seal((selection.fit if settled is None else settled.fit).values)[number])
@@ -220,12 +218,15 @@ def seal_document(
 
 
 def _covariance(selection: LawSelection, number: int) -> dict[str, Any]:
-    """Covariance of the parameters of one seal of a kind, by fits without each group."""
-    law = selection.law
+    """Covariance of the parameters of one seal of a kind, by fits without each group; of a term that is none: prior."""
+    law, model = selection.law, selection.fit.model
     terms = list(dict.fromkeys(p.name.rpartition('.')[2] for p in law.parameters))  # without the name of a kind
     of_one = [law.of_one_seal(each)[number] for each in selection.validation.values]
     covariance = jackknife_covariance(table_of(of_one, terms))
     std = np.sqrt(np.diag(covariance))
+    none = {} if model is None else fitting.std_of_none(law, model, selection.readings.at.pressure.shape[1])
+    of_prior = law.of_one_seal(selection.fit.values | none)[number]
+    std = np.array([of_prior[term] if term in none else found for term, found in zip(terms, std, strict=True)])
     correlation = np.clip(covariance / np.maximum(np.outer(std, std), 1e-300), -1.0, 1.0)
     return {'terms': terms, 'std': std, 'correlation': correlation[np.triu_indices(len(terms), 1)]}
 
