@@ -62,11 +62,7 @@ class Account(NamedTuple):
         return {reason: self.left_out[reason] for reason in FAULTS if self.left_out.get(reason)}
 
     def check(self) -> None:
-        """Check that few samples are faulty.
-
-        Raises:
-            ValueError: More than `MOST_DROPPED` are; with the reasons.
-        """
+        """Check that few samples are faulty. ValueError: more than `MOST_DROPPED` are; with the reasons."""
         faulty = sum(self._faults.values())
         if faulty > MOST_DROPPED * self.total:
             why = ', '.join(f'{reason} {count}' for reason, count in self._faults.items())

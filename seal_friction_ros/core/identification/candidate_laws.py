@@ -137,8 +137,7 @@ class CandidateLaw:
     def friction_law(self, values: ParameterValues) -> FrictionLaw:
         """The friction law of one seal, without velocity terms; parameters of other laws are ignored.
 
-        Raises:
-            ValueError: A value is out of bounds.
+        ValueError: a value is out of bounds.
         """
         part_name, part_type = self.law_type.FITTED_PART or ('', self.law_type)
         given = {**values, **self.fixed}

@@ -141,16 +141,14 @@ def fit_load(signals: Signals, position: FloatArray, chambers: Sequence[str], sl
     acceleration is a difference of velocities). The number of intervals of the spline and the terms of inertia and
     friction are those with which left-out pairs of strokes are predicted best; of models within one standard error and
     `NEGLIGIBLE_LOSS` of the best, the one with the fewest terms is taken, after [Breiman1984]_; the second bound and
-    the limit `ILL_CONDITIONED` are our choice.
+    the limit `ILL_CONDITIONED` are our choice. ValueError: the load cannot be told from friction; one line with the
+    reason and what to drive.
 
     Args:
         signals: Signals of the log; the force sum is p_a A_a - p_b A_b.
         position: Position of the rod [m], positive on extension, shape (n,).
         chambers: Chamber (a or b) of each seal.
         sliding: A rod that is slower than ``slowest`` counts as at rest.
-
-    Raises:
-        ValueError: The load cannot be told from friction; one line with the reason and what to drive.
     """
     motion = _strokes(signals, position, sliding)
     low, high = _shared_positions(motion)

@@ -313,8 +313,7 @@ def _full_yield(presliding: Presliding, friction: float) -> float:
 def fit_presliding(logs: Sequence[ReversalLog]) -> PreslidingFit:
     """Fit the elasticity of all seals together to all reversals; the length of the curves follows from the fit.
 
-    Raises:
-        PreslidingRefusedError: There are too few reversals, the position is too coarse, or the elasticity is not told.
+    PreslidingRefusedError: there are too few reversals, the position is too coarse, or the elasticity is not told.
     """
     names, length = [log.name for log in logs], half_stroke(logs)
     fit = fit_curves(reversal_curves(logs, length), names, length)
@@ -337,11 +336,7 @@ def fit_presliding(logs: Sequence[ReversalLog]) -> PreslidingFit:
 
 
 def half_stroke(logs: Sequence[ReversalLog]) -> float:
-    """Half of the median stroke [m], the least over the logs.
-
-    Raises:
-        PreslidingRefusedError: A log has too few reversals.
-    """
+    """Half of the median stroke [m], the least over the logs. PreslidingRefusedError: a log has too few reversals."""
     lengths = []
     for log in logs:
         spread = float(np.ptp(log.position))
@@ -359,10 +354,8 @@ def half_stroke(logs: Sequence[ReversalLog]) -> float:
 def fit_curves(curves: Sequence[ReversalCurve], names: Sequence[str], length: float) -> PreslidingFit:
     """Fit the elasticity to some reversals of the logs called ``names``, whose curves are ``length`` [m] long.
 
-    Lag and dwell are taken where the logs tell them.
-
-    Raises:
-        PreslidingRefusedError: There are too few reversals, or the elasticity is not told.
+    Lag and dwell are taken where the logs tell them. PreslidingRefusedError: there are too few reversals, or the
+    elasticity is not told.
     """
     starts = _checked_starts(curves, names, FEWEST_REVERSALS)
     samples = _samples(curves)
@@ -441,13 +434,12 @@ def _parameters_of(fit: PreslidingFit) -> FloatArray:
 def score_presliding(logs: Sequence[ReversalLog], length: float, within: float) -> PreslidingScore:
     """Fit every second reversal of each log and predict the others.
 
+    PreslidingRefusedError: half of the reversals do not tell the elasticity.
+
     Args:
         logs: The logs.
         length: Of the curves [m], from `PreslidingFit`.
         within: Displacement up to which the errors count [m]; at most ``length``.
-
-    Raises:
-        PreslidingRefusedError: Half of the reversals do not tell the elasticity.
     """
     curves = reversal_curves(logs, length)
     seen, unseen = [], []

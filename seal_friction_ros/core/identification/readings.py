@@ -259,9 +259,8 @@ class PreparedReadings(NamedTuple):
 def check_log(log: RecordedLog) -> None:
     """Check a log.
 
-    Raises:
-        ValueError: Too few samples, missing or impossible values, no motion, motion in one direction only, or a clipped
-            sensor.
+    ValueError: too few samples, missing or impossible values, no motion, motion in one direction only, or a clipped
+    sensor.
     """
     name, signals, sliding, *_ = log
     if len(signals.time) < 20:
@@ -317,10 +316,7 @@ def check_log(log: RecordedLog) -> None:
 def check_clipping(name: str, what: str, column: FloatArray, *, is_pressure: bool = False) -> None:
     """Check the signal ``what`` of the source ``name``: samples while the rod moves, shape (n,); a pressure in Pa.
 
-    A pressure may stand at that of the air: a vented chamber does.
-
-    Raises:
-        ValueError: The sensor is clipped.
+    A pressure may stand at that of the air: a vented chamber does. ValueError: the sensor is clipped.
     """
     low_is_real = is_pressure and is_ambient(float(np.nanmin(column, initial=np.inf)))  # a vented chamber
     share = clipped_share(column, low_is_real=low_is_real)
@@ -333,11 +329,7 @@ def check_clipping(name: str, what: str, column: FloatArray, *, is_pressure: boo
 
 
 def check_manual_readings(manual: ManualReadings) -> None:
-    """Check manual readings.
-
-    Raises:
-        ValueError: Missing values, too few readings, negative friction, or impossible values.
-    """
+    """Check manual readings. ValueError: missing values, too few readings, negative friction, or impossible values."""
     for what, column in (('pressure', manual.pressure), ('friction', manual.friction)):
         wrong = int(np.count_nonzero(~np.isfinite(column)))
         if wrong:
@@ -409,8 +401,7 @@ def _check_pressures(where: str, readings: FrictionReadings) -> None:
 def check_readings(readings: FrictionReadings) -> None:
     """Check that a law can be fitted to readings.
 
-    Raises:
-        ValueError: Negative friction, or forces and pressures that do not belong to one seal.
+    ValueError: negative friction, or forces and pressures that do not belong to one seal.
     """
     where = ', '.join(readings.names)
     _check_pressures(where, readings)

@@ -205,8 +205,7 @@ def advice(readings: FrictionReadings, model: ModelFit | None = None) -> str:
 def check_kinds(readings: FrictionReadings) -> None:
     """Check that the pressures of the kinds were varied, and independently.
 
-    Raises:
-        ValueError: A kind sees one pressure only, or pressures moved together; what to measure.
+    ValueError: a kind sees one pressure only, or pressures moved together; what to measure.
     """
     where, kinds = ', '.join(readings.names), readings.kinds
     for number, kind in enumerate(kinds):
@@ -263,11 +262,7 @@ def poorly_told_apart(
 def check_told_apart(
     found: ToldApart, model: ModelFit, readings: FrictionReadings, largest_error: float = LARGEST_KIND_ERROR
 ) -> None:
-    """Check the standard error of each kind.
-
-    Raises:
-        ValueError: It is too large; what to measure.
-    """
+    """Check the standard error of each kind. ValueError: it is too large; what to measure."""
     poor = poorly_told_apart(found, readings.kinds, largest_error)
     if poor:
         name, friction, error = poor[0]

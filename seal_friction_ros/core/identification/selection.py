@@ -110,11 +110,7 @@ Scores = Sequence[LawScore | NotScored]
 
 
 def scored(scores: Scores) -> list[LawScore]:
-    """The laws that could be fitted.
-
-    Raises:
-        ValueError: There is none; with the reasons.
-    """
+    """The laws that could be fitted. ValueError: there is none; with the reasons."""
     found = [score for score in scores if isinstance(score, LawScore)]
     if not found:
         reasons = '; '.join(f'{score.law.name}: {score.why_not}' for score in scores if isinstance(score, NotScored))
@@ -193,10 +189,7 @@ def recommended(scores: Scores, *, rises: bool = False) -> LawScore:
 
     Laws whose parameters are at a bound or ill-conditioned only compete if no sound law is `NEAR`. Where friction
     ``rises`` (`rises_over_pressures`), a law without pressure and speed does not compete. Of laws with equally many
-    parameters the one with the smallest mean loss is taken.
-
-    Raises:
-        ValueError: No law was fitted.
+    parameters the one with the smallest mean loss is taken. ValueError: no law was fitted.
 
     Source: after the one-standard-error rule of [Breiman1984]_; the rest is our choice.
     """

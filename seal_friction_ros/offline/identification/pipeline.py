@@ -98,6 +98,9 @@ def identify(
 ) -> Identification:
     """Read bags, logs, tables or data sheets, fit every law, select one and assess it.
 
+    ValueError: the folder or the cluster cannot be used, the data are unfit for identification, or no law predicts
+    them; one line with the reason and what to measure instead.
+
     Args:
         paths: The sources, by path or URL.
         options: How.
@@ -105,10 +108,6 @@ def identify(
         workers: Sources, and groups of readings that are left out, at a time, or a cluster; the result does not depend
             on it.
         work: Folder that keeps what was found without each group, so that an interrupted run resumes; None keeps none.
-
-    Raises:
-        ValueError: The folder or the cluster cannot be used, the data are unfit for identification, or no law predicts
-            them; one line with the reason and what to measure instead.
     """
     data = gather(paths, options, workers)
     elastic = identify_presliding(data.sources) if options.presliding else None
@@ -139,10 +138,8 @@ def identify(
 def gather(paths: Sequence[Place], options: IdentifyOptions, workers: Workers = 1) -> IdentificationData:
     """Read the sources, correct the force sum, take all readings to one temperature, exclude a pressure that is off.
 
-    Arguments are those of `identify`.
-
-    Raises:
-        ValueError: The data are unfit for identification, or do not tell the kinds of seals apart.
+    Arguments are those of `identify`. ValueError: the data are unfit for identification, or do not tell the kinds of
+    seals apart.
     """
     of_sources, kinds = options.sources, options.kinds
     if kinds:
@@ -269,8 +266,7 @@ def select_law(
 ) -> LawSelection:
     """Fit and score every candidate law; select the recommended one, or the one called ``name``; the rest as above.
 
-    Raises:
-        ValueError: No law could be fitted, the selected one predicts nothing, or there is no law of that name.
+    ValueError: no law could be fitted, the selected one predicts nothing, or there is no law of that name.
     """
     with progress('fit and leave out', len(_candidates(data.used, data.ring)) + MOST_EXTENSIONS) as advance:
         scores = _scored(data.used, data.ring, data.sources.has_fitted_load, advance)

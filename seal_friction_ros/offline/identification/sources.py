@@ -93,11 +93,7 @@ class Sources:
         return any(source.load is not None for source in self.each)
 
     def prepare(self) -> PreparedReadings:
-        """Readings of all sources.
-
-        Raises:
-            ValueError: They are unfit for identification.
-        """
+        """Readings of all sources. ValueError: they are unfit for identification."""
         logs = [source.log for source in self.each if source.log is not None]
         if logs:
             return prepare_logs(logs, self.chambers)
@@ -122,14 +118,13 @@ class Sources:
 def read_sources(paths: Sequence[Place], options: SourceOptions, workers: Workers = 1) -> Sources:
     """Read every source: bags and logs, or tables and data sheets.
 
+    ValueError: a source cannot be read, is of no known kind, or does not fit the others; one line that names it. Or the
+    cluster cannot be used.
+
     Args:
         paths: The sources, by path or URL.
         options: How.
         workers: Sources at a time, or a cluster, whose workers read them.
-
-    Raises:
-        ValueError: A source cannot be read, is of no known kind, or does not fit the others; one line that names it. Or
-            the cluster cannot be used.
     """
     if not paths:
         raise ValueError('no source: give a bag, a log or a table')
@@ -199,10 +194,8 @@ def _read(path: Path, options: SourceOptions) -> Source:
 def without_load_of(source: Source, chambers: Sequence[str], options: SourceOptions) -> Source:
     """The source with load and inertia taken out of its force sum, if that holds a load which follows position.
 
-    With known inertia, samples at higher accelerations are used too, unless the options limit them.
-
-    Raises:
-        ValueError: The load cannot be told from friction; names the log.
+    With known inertia, samples at higher accelerations are used too, unless the options limit them. ValueError: the
+    load cannot be told from friction; names the log.
     """
     if source.log is None or source.load_position is None:
         return source
@@ -370,9 +363,7 @@ def read_table(path: Path) -> tuple[ManualReadings, ManualReadings]:
     Columns, by the names in its first row: ``pressure_<unit>`` (psig, psi, bar, kPa, MPa, Pa) and ``friction_<unit>``
     (lbf, N, kN), of all seals; optional ``direction`` (extend or retract), ``kind`` (dynamic or static), ``test``,
     ``velocity_<unit>`` (m_per_s, mm_per_s, in_per_s) and ``dwell_s``, the time at rest before a static reading.
-
-    Raises:
-        ValueError: The table cannot be read or a cell is invalid; one line that names file, row and column.
+    ValueError: the table cannot be read or a cell is invalid; one line that names file, row and column.
     """
     rows = table_rows(path)
     if not rows:
@@ -395,8 +386,7 @@ def read_table(path: Path) -> tuple[ManualReadings, ManualReadings]:
 def table_rows(path: Path) -> list[dict[str, str]]:
     """Rows of a table of comma-separated values as mappings from the names in its first row, in lower case.
 
-    Raises:
-        ValueError: It cannot be read, or a row and the first row differ in their number of cells.
+    ValueError: it cannot be read, or a row and the first row differ in their number of cells.
     """
     lines = [line for line in read_text(path).splitlines(keepends=True) if line.strip() and not line.startswith('#')]
     rows = []
@@ -411,9 +401,7 @@ def column_in_si(path: Path, rows: Sequence[Mapping[str, str]], quantity: str, u
     """A column of the table ``path`` in SI units; its name is that of the quantity, followed by a unit.
 
     ``rows`` are those of `table_rows`, at least one; ``units`` maps the unit in the name to the unit in `UNITS`.
-
-    Raises:
-        ValueError: There is no such column, or several, or a cell is not a number.
+    ValueError: there is no such column, or several, or a cell is not a number.
     """
     found = [name for name in rows[0] if name.startswith(quantity)]
     unit = found[0].removeprefix(quantity).strip('_ ()[]') if found else ''
