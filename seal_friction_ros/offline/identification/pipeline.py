@@ -193,7 +193,7 @@ def _prepared(sources: Sources, kinds: tuple[SealKind, ...]) -> PreparedReadings
     return prepared._replace(readings=readings)
 
 
-def _correction(prepared: PreparedReadings, has_fitted_load: bool) -> ForceCorrection | seal_kinds.AreaErrors | None:
+def _correction(prepared: PreparedReadings, has_fitted_load: bool) -> ForceCorrection | None:
     if not prepared.readings.kinds:
         return force_correction(prepared)
     variation = variation_of(prepared.readings)

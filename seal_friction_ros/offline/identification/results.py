@@ -21,7 +21,7 @@ from seal_friction_ros.core.identification.force_correction import NOTICED, Forc
 from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
 from seal_friction_ros.core.identification.run_in import Drift, SettledLaw
 from seal_friction_ros.core.identification.runs import BetweenRuns
-from seal_friction_ros.core.identification.seal_kinds import AreaErrors, ToldApart, proposed_conditions
+from seal_friction_ros.core.identification.seal_kinds import ToldApart, proposed_conditions
 from seal_friction_ros.core.identification.selection import ChosenAnew, LawScore, NotScored, is_beaten, scored
 from seal_friction_ros.core.identification.signal_preparation import LEVEL_GAP, LEVEL_GAP_MIN
 from seal_friction_ros.core.identification.temperature import TemperatureFit
@@ -57,8 +57,7 @@ class IdentificationData:
     used: FrictionReadings  # those that the law is fitted to
     ring: Ring | None
     outlier: Outlier | None
-    correction: ForceCorrection | AreaErrors | None
-    """of areas in the force sum, made if it is significant; None if unknown"""
+    correction: ForceCorrection | None  # made if it is significant; None if unknown
     temperature: TemperatureFit | None = None  # all readings are at its reference if it is identified
 
     @property
@@ -395,7 +394,7 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
             'condition_number': selection.fit.condition_number,
             'correlation': selection.fit.correlation.tolist(),
             'offset_N': [level.offset for level in levels],
-            **_correction_numbers(data.correction if isinstance(data.correction, ForceCorrection) else None),
+            **_correction_numbers(data.correction),
             'between_run_std': quality.between_runs.std,
             'between_runs_measured': quality.between_runs.measured,
             'told_apart_std': quality.told_apart,
@@ -422,7 +421,7 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
 
 def _correction_numbers(correction: ForceCorrection | None) -> dict[str, Any]:
     """The area that the force sum misses; None of each if it was not looked for."""
-    if correction is None:
+    if correction is None or correction.line is None:
         return dict.fromkeys(('area_correction_m2', 'area_correction', 'offset_line'))
     line = correction.line
     return {

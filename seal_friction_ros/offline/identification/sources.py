@@ -19,7 +19,6 @@ from seal_friction_ros.core.identification import admission, load_over_position
 from seal_friction_ros.core.identification.force_correction import ForceCorrection
 from seal_friction_ros.core.identification.prepare_readings import prepare_logs, prepare_manual_readings
 from seal_friction_ros.core.identification.readings import ManualReadings, PreparedReadings, RecordedLog, check_clipping
-from seal_friction_ros.core.identification.seal_kinds import AreaErrors
 from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding
 from seal_friction_ros.files import config_path, share_directory
 from seal_friction_ros.offline.bags.actuator_bag import open_actuator
@@ -106,7 +105,7 @@ class Sources:
         """Area by which the rig file turns the pressure into force [m^2]; None if the sources have no rig file."""
         return next((source.pressure_area for source in self.each if source.pressure_area is not None), None)
 
-    def corrected(self, correction: ForceCorrection | AreaErrors) -> 'Sources':
+    def corrected(self, correction: ForceCorrection) -> 'Sources':
         """The sources with areas of the force sum corrected in every log."""
         each = tuple(
             s if s.log is None else s._replace(log=s.log._replace(signals=correction.corrected(s.log.signals)))

@@ -51,13 +51,8 @@ def warnings_of(
             f'measured at {low:.4g} to {high:.4g} bar only: there the law holds; how friction rises beyond comes from '
             'a prior, not from these data: measure at three pressures to know it'
         )
-    if isinstance(data.correction, ForceCorrection) and data.correction.is_significant:
+    if data.correction is not None and data.correction.is_significant:
         yield _correction_text(data.correction, data.sources.pressure_area)
-    elif data.correction is not None and data.correction.is_significant:
-        change = ' and '.join(
-            f'{1e6 * x:+.3g} mm2 for chamber {c}' for c, x in zip('ab', data.correction.areas, strict=True)
-        )
-        yield f'the areas in the force sum are off: {change}; the laws are fitted with the corrected areas'
     if data.outlier is not None:
         yield _outlier_text(data.outlier, levels)
     yield from _collinearity_texts(data, selection)
@@ -95,6 +90,11 @@ def _change_texts(quality: LawQuality) -> Iterator[str]:
 
 
 def _correction_text(correction: ForceCorrection, area: float | None) -> str:
+    if not correction.chamber:
+        change = ' and '.join(
+            f'{1e6 * x:+.3g} mm2 for chamber {c}' for c, x in zip('ab', correction.areas, strict=True)
+        )
+        return f'the areas in the force sum are off: {change}; the laws are fitted with the corrected areas'
     change = f'{1e6 * correction.area:+.3g} mm2 (standard error {1e6 * correction.standard_error:.2g} mm2)'
     text = (
         f'the area of chamber {correction.chamber} in the force sum is off: its offset follows the pressure, by '
