@@ -73,13 +73,7 @@ class Account(NamedTuple):
 
 
 def account(name: str, reasons: Mapping[str, BoolArray], earlier: Mapping[str, int] | None = None) -> Account:
-    """Account of n samples.
-
-    Args:
-        name: Of the source.
-        reasons: Reason -> samples that it holds for, shape (n,); the first one counts.
-        earlier: Reason -> number of samples that were left out before.
-    """
+    """Account of n samples: the first of the ``reasons``, shape (n,) each, counts; ``earlier`` counts are added."""
     counts = Counter(earlier or {})
     left = np.ones(len(next(iter(reasons.values()))), dtype=bool)
     for reason, holds in reasons.items():

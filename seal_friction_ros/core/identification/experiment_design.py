@@ -112,11 +112,8 @@ def design_experiment(
     `SPEED_FACTORS`. If the spread between runs limits the band, the pressures of the readings are proposed once more,
     for another day, and other speeds only if speed was not varied.
 
-    Args:
-        readings: Those at hand.
-        between: Spread between runs; None if it is stated, or if groups left out are runs.
-        of_band: Relative standard deviation between runs that is in the band [-].
-        count: Number of pressures and speeds, without repeated ones.
+    The spread ``between`` runs is None if it is stated, or if groups left out are runs; ``of_band`` is the relative
+    standard deviation between runs in the band [-], ``count`` the number of points without repeated ones.
 
     Source: linear criteria and their greedy (sequential) minimisation are in [AtkinsonDonevTobias2007]_.
     """

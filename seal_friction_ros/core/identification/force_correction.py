@@ -39,10 +39,8 @@ def force_correction(prepared: PreparedReadings) -> ForceCorrection | None:
     The offset of a level is half the sum of its two directions, in which friction cancels. A wrong area adds a share of
     the pressure to it; a load cell adds a constant. The area counts as wrong if the slope is beyond the noise of the
     line (t-test at `CONFIDENCE`) and changes the offset by more than `NOTICED` of the friction.
-
-    Returns:
-        None for swept logs and manual readings, fewer than three pressures, and if both chambers are under pressure, so
-        that it is not known whose area is wrong.
+    None for swept logs and manual readings, fewer than three pressures, and if both chambers are under pressure, so
+    that it is not known whose area is wrong.
     """
     readings, levels = prepared.readings, prepared.readings.levels
     if not readings.samples or len(levels) < 3:

@@ -144,11 +144,7 @@ def fit_load(signals: Signals, position: FloatArray, chambers: Sequence[str], sl
     the limit `ILL_CONDITIONED` are our choice. ValueError: the load cannot be told from friction; one line with the
     reason and what to drive.
 
-    Args:
-        signals: Signals of the log; the force sum is p_a A_a - p_b A_b.
-        position: Position of the rod [m], positive on extension, shape (n,).
-        chambers: Chamber (a or b) of each seal.
-        sliding: A rod that is slower than ``slowest`` counts as at rest.
+    The force sum is p_a A_a - p_b A_b; the position of the rod [m], shape (n,), is positive on extension.
     """
     motion = _strokes(signals, position, sliding)
     low, high = _shared_positions(motion)
@@ -166,12 +162,6 @@ def without_load(signals: Signals, position: FloatArray, load: LoadOverPosition,
     Samples beyond the positions of the load are left out. While the rod moves, velocity, pressures and the force that
     is left are centred means over `averaging_window` within one motion, and one sample is kept in a quarter of
     `MEAN_OVER`: the noise of two pressures times their areas is often as large as the friction (our choice).
-
-    Args:
-        signals: Signals of the log, with load.
-        position: Position [m], shape (n,).
-        load: From `fit_load`.
-        sliding: A rod that is slower than ``slowest`` counts as at rest.
     """
     inertia = inertia_at(load, position, signals.velocity, np.gradient(signals.velocity, signals.time))
     force = signals.force_sum - load_at(load, position) - inertia

@@ -203,11 +203,8 @@ def friction_after_reversal(
 ) -> FloatArray:
     """Friction in the direction of the motion after the reversal [N], shape (n,): the equation at the top.
 
-    Args:
-        parameters: ln K, p, epsilon, ln L, ln tau; a ln tau of -inf: no dwell.
-        displacement: Since the reversal [m], shape (n,).
-        friction: f_c [N], shape (n,) or a number.
-        rest: At the reversal [s], likewise.
+    Parameters are those `SHARED`, where a ln tau of -inf is no dwell; the displacement [m] since the reversal has the
+    shape (n,); friction f_c [N] and rest [s] at the reversal likewise, or they are numbers.
     """
     log_stiffness, exponent, excess, log_length, log_dwell = parameters
     shares = ((np.arange(SLOTS) + 0.5) / SLOTS) ** exponent
@@ -436,10 +433,7 @@ def score_presliding(logs: Sequence[ReversalLog], length: float, within: float) 
 
     PreslidingRefusedError: half of the reversals do not tell the elasticity.
 
-    Args:
-        logs: The logs.
-        length: Of the curves [m], from `PreslidingFit`.
-        within: Displacement up to which the errors count [m]; at most ``length``.
+    The curves have the ``length`` of `PreslidingFit` [m]; errors count ``within`` a displacement of at most that [m].
     """
     curves = reversal_curves(logs, length)
     seen, unseen = [], []

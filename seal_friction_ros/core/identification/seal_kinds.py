@@ -235,11 +235,7 @@ def _check_not_by_one(readings: FrictionReadings, where: str) -> None:
 def poorly_told_apart(
     found: ToldApart, kinds: Sequence[SealKind], largest_error: float = LARGEST_KIND_ERROR
 ) -> list[tuple[str, float, float]]:
-    """Kinds whose standard error is larger than that share of their friction, and not small beside all friction.
-
-    Returns:
-        Name, friction [N] and its standard error [N] of each.
-    """
+    """Kinds with a standard error above that share of their friction, and not small: name, friction and error [N]."""
     small = SMALL_ERROR * float(found.friction.sum())
     return [
         (kind.name, friction, error)

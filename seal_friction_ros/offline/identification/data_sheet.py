@@ -185,14 +185,9 @@ def write_sheet(plan: FrictionTestPlan, out: Path) -> None:
 
 
 def write_new_csv(text: str, out: Path, hint: str = '') -> None:
-    """Write a CSV file that a person works on.
+    """Write a CSV file that a person works on; the error about another suffix adds the ``hint``.
 
     ValueError: ``out`` exists already and may be filled in, or it cannot be written.
-
-    Args:
-        text: The file.
-        out: Where; it does not exist yet.
-        hint: What the error about another suffix adds.
     """
     if out.suffix != '.csv':
         raise ValueError(f'{out}: name it .csv{hint and f"; {hint}"}')

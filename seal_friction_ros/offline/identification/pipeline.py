@@ -105,8 +105,7 @@ def identify(
         paths: The sources, by path or URL.
         options: How.
         name: Of the seal, unless the options name it.
-        workers: Sources, and groups of readings that are left out, at a time, or a cluster; the result does not depend
-            on it.
+        workers: Sources, and groups that are left out, at a time, or a cluster; the result does not depend on it.
         work: Folder that keeps what was found without each group, so that an interrupted run resumes; None keeps none.
     """
     data = gather(paths, options, workers)

@@ -115,15 +115,10 @@ class Sources:
 
 
 def read_sources(paths: Sequence[Place], options: SourceOptions, workers: Workers = 1) -> Sources:
-    """Read every source: bags and logs, or tables and data sheets.
+    """Read every source, by path or URL, as many ``workers`` at a time: bags and logs, or tables and data sheets.
 
     ValueError: a source cannot be read, is of no known kind, or does not fit the others; one line that names it. Or the
     cluster cannot be used.
-
-    Args:
-        paths: The sources, by path or URL.
-        options: How.
-        workers: Sources at a time, or a cluster, whose workers read them.
     """
     if not paths:
         raise ValueError('no source: give a bag, a log or a table')
