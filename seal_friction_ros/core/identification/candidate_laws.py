@@ -219,9 +219,7 @@ class Variation(NamedTuple):
 
 
 def candidate_laws(
-    variation: Variation,
-    geometry: SealGeometry | None = None,
-    normal_force_law: NormalForceLaw | None = None,
+    variation: Variation, geometry: SealGeometry | None = None, normal_force_law: NormalForceLaw | None = None
 ) -> tuple[CandidateLaw, ...]:
     """Laws without velocity terms that the data can identify, from simple to complex, and the constant one with them.
 

@@ -24,12 +24,7 @@ from seal_friction_ros.core.identification.friction_model import (
 from seal_friction_ros.core.identification.readings import FrictionReadings
 
 ILL_CONDITIONED = 30.0  # condition number of the scaled Jacobian; after [Belsley1980]_
-LINEAR = {
-    'coulomb_friction_at_any_pressure',
-    'friction_at_no_pressure',
-    'friction_at_one_bar',
-    'viscous_friction',
-}
+LINEAR = {'coulomb_friction_at_any_pressure', 'friction_at_no_pressure', 'friction_at_one_bar', 'viscous_friction'}
 """Parameters in which a law is linear, where all its parameters are of them."""
 
 
@@ -96,11 +91,7 @@ def _means_of_sources(readings: FrictionReadings, force: FloatArray) -> FloatArr
     return np.array(means)
 
 
-def fit(
-    law: CandidateLaw,
-    readings: FrictionReadings,
-    start_values: ParameterValues | None = None,
-) -> LawFit:
+def fit(law: CandidateLaw, readings: FrictionReadings, start_values: ParameterValues | None = None) -> LawFit:
     """Least-squares fit of a law, with one offset of the force sum for each source.
 
     The offsets are linear and are eliminated. ``start_values`` are those of a simpler law or of similar readings.

@@ -520,10 +520,10 @@ def _check_same_load(model: _Model, means: _Means, load: LoadOverPosition) -> No
     of_load = model.columns[:, :k] @ load.forces
     masses = np.array([load.mass, *load.mass_change])[: model.inertia]
     residual = means.force - of_load - model.columns[:, k:] @ np.concatenate((masses, load.friction.values))
-    strokes = np.unique(means.stroke)
-    direction = np.array([means.direction[means.stroke == s][0] for s in strokes])
-    mean = np.array([np.average(residual[inside], weights=means.counts[inside]) for inside in _each(means, strokes)])
-    scatter = np.array([residual[inside].std() / np.sqrt(inside.sum()) for inside in _each(means, strokes)])
+    of_strokes = [means.stroke == stroke for stroke in np.unique(means.stroke)]
+    direction = np.array([means.direction[inside][0] for inside in of_strokes])
+    mean = np.array([np.average(residual[inside], weights=means.counts[inside]) for inside in of_strokes])
+    scatter = np.array([residual[inside].std() / np.sqrt(inside.sum()) for inside in of_strokes])
     next_is_back = np.flatnonzero(direction[:-1] != direction[1:])
     offsets = (mean[next_is_back] + mean[next_is_back + 1]) / 2.0
     errors = np.hypot(scatter[next_is_back], scatter[next_is_back + 1])  # twice that of white noise: rows correlate
@@ -536,7 +536,3 @@ def _check_same_load(model: _Model, means: _Means, load: LoadOverPosition) -> No
             f'the load changes between strokes by {span:.3g} N (mean load {size:.3g} N), so it is no function of '
             'position: drive all strokes with one load, and put logs with another load in files of their own'
         )
-
-
-def _each(means: _Means, strokes: IntArray) -> list[BoolArray]:
-    return [means.stroke == stroke for stroke in strokes]

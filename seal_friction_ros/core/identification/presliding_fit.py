@@ -29,6 +29,7 @@ from scipy.optimize import least_squares
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.friction.presliding import SLOTS, Presliding
+from seal_friction_ros.core.identification.validation import jackknife_errors
 
 FEWEST_REVERSALS = 4  # of one log, in each half of them
 STEPS_PER_LENGTH = 5.0  # [-] steps of the position that the presliding length must have
@@ -274,9 +275,8 @@ def _standard_errors(solution: _Solution, samples: _Samples) -> FloatArray:
         inside = group == number
         left = normal - j[inside].T @ j[inside]
         steps.append(np.linalg.lstsq(left, j[inside].T @ r[inside], rcond=None)[0])
-    deviations = np.array(steps) - np.mean(steps, axis=0)
     errors = np.full(len(solution.parameters), np.nan)
-    errors[solution.free] = np.sqrt((groups - 1) / groups * np.sum(deviations**2, axis=0))
+    errors[solution.free] = jackknife_errors(np.array(steps))
     return errors
 
 

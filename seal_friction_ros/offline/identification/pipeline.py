@@ -24,12 +24,7 @@ from seal_friction_ros.core.friction.seal_file import parse_part, parse_seal
 from seal_friction_ros.core.identification import diagnostics, fitting, run_in, runs, seal_kinds, validation
 from seal_friction_ros.core.identification.breakaway import BreakawayFit, fit_breakaway
 from seal_friction_ros.core.identification.calibration import calibration
-from seal_friction_ros.core.identification.candidate_laws import (
-    CandidateLaw,
-    SealKind,
-    candidate_laws,
-    normal_forces,
-)
+from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, SealKind, candidate_laws, normal_forces
 from seal_friction_ros.core.identification.force_correction import ForceCorrection, force_correction
 from seal_friction_ros.core.identification.friction_model import Told
 from seal_friction_ros.core.identification.prepare_readings import with_predictable_groups
@@ -161,7 +156,7 @@ def gather(paths: Sequence[Place], options: IdentifyOptions, workers: Workers = 
     readings = _with_normal_force(prepared.readings, ring)
     outlier = None
     if not readings.are_samples and not kinds and len(readings.levels) >= 4:
-        laws = _power_laws(readings)
+        laws = [law for law in _candidates(readings) if law.law_type is PressurePowerLaw and law.fixed]
         offsets = fitting.fit(laws[0], readings).offsets
         floor = diagnostics.repeatability(readings, offsets)
         outlier = diagnostics.outlying_level(laws, readings, floor if math.isfinite(floor) else 0.0)
@@ -208,11 +203,6 @@ def _told_apart(data: IdentificationData, selection: LawSelection, largest_error
     found = seal_kinds.told_apart(model, data.used)
     seal_kinds.check_told_apart(found, model, data.used, largest_error)
     return found
-
-
-def _power_laws(readings: FrictionReadings) -> tuple[CandidateLaw, ...]:
-    """The pressure power law with each fixed exponent."""
-    return tuple(law for law in _candidates(readings) if law.law_type is PressurePowerLaw and law.fixed)
 
 
 def _ring(sources: Sources, options: IdentifyOptions) -> Ring | None:
@@ -270,8 +260,8 @@ def select_law(
     with progress('fit and leave out', len(_candidates(data.used, data.ring)) + MOST_EXTENSIONS) as advance:
         scores = _scored(data.used, data.ring, data.sources.has_fitted_load, advance)
     best = recommended(scores, rises=rises_over_pressures(data.used))
-    settled, readings, share = _settled(data, best), data.used, np.ones(data.used.count)
-    is_no_run_in = False
+    readings, share, is_no_run_in = data.used, np.ones(data.used.count), False
+    settled = run_in.settled_readings(readings, fitting.offsets_of(readings, best.fit.friction(readings.at)))
     if settled is not None and len(data.used.levels) >= FEWEST_TO_COMPARE:
         of_settled = _scored(settled.readings, data.ring, data.sources.has_fitted_load)
         best_settled = recommended(of_settled, rises=rises_over_pressures(settled.readings))
@@ -311,11 +301,6 @@ def select_law(
         reference=validation.plain_mean(data.used),
         chosen_anew=anew,
     )
-
-
-def _settled(data: IdentificationData, best: LawScore) -> run_in.SettledReadings | None:
-    """Readings of the settled seal; None if no drift is evident. The ``best`` law tells the offset of the force sum."""
-    return run_in.settled_readings(data.used, fitting.offsets_of(data.used, best.fit.friction(data.used.at)))
 
 
 def _choose_anew(

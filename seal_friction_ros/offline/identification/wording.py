@@ -59,7 +59,6 @@ def warnings_of(
     gain = _pressure_gain(selection)
     if gain is not None and not gain[1]:
         yield f'no gain is claimed for pressure: {gain[0]}: the difference is within the noise'
-    yield from _parameter_texts(selection)
     yield from _scatter_texts(selection, quality, levels)
     if quality.breakaway is not None and quality.breakaway.dwell is not None:
         yield _dwell_text(quality.breakaway)
@@ -183,13 +182,6 @@ def _pressure_gain(selection: LawSelection) -> tuple[str, bool] | None:
     return f'{text} ({other_name})', selection.best.law.depends_on_pressure
 
 
-def _parameter_texts(selection: LawSelection) -> Iterator[str]:
-    for parameter in selection.law.parameters:
-        value = selection.fit.values[parameter.name]
-        if value == 0.0 and parameter.lower == 0.0:
-            yield f'{parameter.name} is 0: these data show no such effect'
-
-
 def one_run_text(between: BetweenRuns) -> str:
     """That data of one run do not show how runs differ, and what stands for it."""
     return (
@@ -200,6 +192,9 @@ def one_run_text(between: BetweenRuns) -> str:
 
 
 def _scatter_texts(selection: LawSelection, quality: LawQuality, levels: Sequence[PressureLevel]) -> Iterator[str]:
+    for parameter in selection.law.parameters:
+        if selection.fit.values[parameter.name] == parameter.lower == 0.0:
+            yield f'{parameter.name} is 0: these data show no such effect'
     between = quality.between_runs
     if between.std > 0.0 and not between.freedom and not quality.is_stated:
         yield one_run_text(between)
