@@ -155,14 +155,10 @@ def gather(paths: Sequence[Place], options: IdentifyOptions, workers: Workers = 
         )
     readings = _with_normal_force(prepared.readings, ring)
     outlier = None
-    if not readings.are_samples and not kinds and len(readings.levels) >= 4:
+    if not readings.are_samples and not kinds:
         laws = [law for law in _candidates(readings) if law.law_type is PressurePowerLaw and law.fixed]
-        offsets = fitting.fit(laws[0], readings).offsets
-        floor = diagnostics.repeatability(readings, offsets)
-        outlier = diagnostics.outlying_level(laws, readings, floor if math.isfinite(floor) else 0.0)
-    used = readings
-    if outlier is not None:
-        used = readings.without(readings.level == outlier.level)
+        outlier = diagnostics.outlying_level(laws, readings)
+    used = readings if outlier is None else readings.without(readings.level == outlier.level)
     return IdentificationData(sources, prepared._replace(readings=readings), used, ring, outlier, correction, warmth)
 
 

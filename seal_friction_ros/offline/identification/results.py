@@ -441,10 +441,7 @@ def _run_in_numbers(data: IdentificationData, drifts: Sequence[Drift]) -> list[d
         {
             'source': data.sources.files[drift.source].name,
             'pressure_Pa': data.prepared.readings.level_pressures[drift.level],
-            'change': drift.change,
-            'is_evident': drift.is_evident,
-            'settled_share': drift.settled_share,
-            'settled_std': drift.settled_std,
+            **dict(zip(Drift._fields[2:], drift[2:], strict=True)),  # from the change on
         }
         for drift in drifts
     ]
