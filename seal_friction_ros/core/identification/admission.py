@@ -62,11 +62,7 @@ class Account(NamedTuple):
         return {reason: self.left_out[reason] for reason in FAULTS if self.left_out.get(reason)}
 
     def check(self) -> None:
-        """Check that few samples are faulty.
-
-        Raises:
-            ValueError: More than `MOST_DROPPED` are; with the reasons.
-        """
+        """Check that few samples are faulty. ValueError: more than `MOST_DROPPED` are; with the reasons."""
         faulty = sum(self._faults.values())
         if faulty > MOST_DROPPED * self.total:
             why = ', '.join(f'{reason} {count}' for reason, count in self._faults.items())
@@ -77,13 +73,7 @@ class Account(NamedTuple):
 
 
 def account(name: str, reasons: Mapping[str, BoolArray], earlier: Mapping[str, int] | None = None) -> Account:
-    """Account of n samples.
-
-    Args:
-        name: Of the source.
-        reasons: Reason -> samples that it holds for, shape (n,); the first one counts.
-        earlier: Reason -> number of samples that were left out before.
-    """
+    """Account of n samples: the first of the ``reasons``, shape (n,) each, counts; ``earlier`` counts are added."""
     counts = Counter(earlier or {})
     left = np.ones(len(next(iter(reasons.values()))), dtype=bool)
     for reason, holds in reasons.items():

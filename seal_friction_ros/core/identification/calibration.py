@@ -66,8 +66,7 @@ def shares_inside(ratios: FloatArray) -> FloatArray:
 
     .. math:: c(p) = \frac{1}{n} \sum_i \left[\,|d_i| / s_i \le \Phi^{-1}\!\left(\tfrac{1 + p}{2}\right)\right]
 
-    Args:
-        ratios: Deviations in standard deviations, abs(d) / s [-], shape (n,).
+    The ``ratios`` are abs(d) / s [-], shape (n,).
 
     Source: [Gneiting2007]_; a central band of a normal distribution is our choice.
     """

@@ -137,8 +137,7 @@ class CandidateLaw:
     def friction_law(self, values: ParameterValues) -> FrictionLaw:
         """The friction law of one seal, without velocity terms; parameters of other laws are ignored.
 
-        Raises:
-            ValueError: A value is out of bounds.
+        ValueError: a value is out of bounds.
         """
         part_name, part_type = self.law_type.FITTED_PART or ('', self.law_type)
         given = {**values, **self.fixed}
@@ -220,9 +219,7 @@ class Variation(NamedTuple):
 
 
 def candidate_laws(
-    variation: Variation,
-    geometry: SealGeometry | None = None,
-    normal_force_law: NormalForceLaw | None = None,
+    variation: Variation, geometry: SealGeometry | None = None, normal_force_law: NormalForceLaw | None = None
 ) -> tuple[CandidateLaw, ...]:
     """Laws without velocity terms that the data can identify, from simple to complex, and the constant one with them.
 

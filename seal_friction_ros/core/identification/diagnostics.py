@@ -98,14 +98,13 @@ class Outlier(NamedTuple):
     standard_deviations: float
 
 
-def outlying_level(laws: Sequence[CandidateLaw], readings: FrictionReadings, floor: float = 0.0) -> Outlier | None:
+def outlying_level(laws: Sequence[CandidateLaw], readings: FrictionReadings) -> Outlier | None:
     """The pressure level that deviates most from the law of the others, if by more than `OUTLIER`; else None.
 
     Each level is left out, and each of the ``laws`` is fitted to the rest; the one that fits the rest best counts. The
     standard deviation of the deviation contains the residuals of the rest, the scatter of a pressure held anew
-    (`LEVEL_SCATTER`, or the repeatability ``floor`` [-] if that is larger), and the leverage of the level. A level at
-    which the law of the rest gives 0 N has no relative deviation: it is not assessed and has no residual. Fewer than
-    four levels have no outlier.
+    (`LEVEL_SCATTER`), and the leverage of the level. A level at which the law of the rest gives 0 N has no relative
+    deviation: it is not assessed and has no residual. Fewer than four levels have no outlier.
     """
     if len(readings.levels) < 4:
         return None
@@ -123,7 +122,7 @@ def outlying_level(laws: Sequence[CandidateLaw], readings: FrictionReadings, flo
         if expected[index] == 0.0 or not rest.any():
             continue
         residual = errors[best] / math.sqrt(max(rest.sum() - len(laws[best].parameters), 1))
-        noise = math.hypot(residual, max(LEVEL_SCATTER, floor))
+        noise = math.hypot(residual, LEVEL_SCATTER)
         slopes = _relative_slopes(fits[best], readings, expected)
         leverage = float(slopes[index] @ np.linalg.pinv(slopes[rest].T @ slopes[rest]) @ slopes[index])
         size = abs(float(deviation[index])) / (noise * math.sqrt(1.0 + leverage))

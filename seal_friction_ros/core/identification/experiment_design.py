@@ -6,7 +6,7 @@ a prior. Readings are chosen one after the other from a grid, each time the one 
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import NamedTuple
@@ -82,16 +82,12 @@ class ExperimentDesign:
     @property
     def limit(self) -> str:
         """What limits the band: the largest of its parts."""
-        return _largest(self.parts)
+        return max(self.parts, key=self.parts.__getitem__)
 
     @property
     def shrink(self) -> float:
         """Standard error of the friction with all proposed readings over that without them [-]."""
         return self.error_after / self.error_before
-
-
-def _largest(parts: Mapping[str, float]) -> str:
-    return max(parts, key=lambda part: parts[part])
 
 
 _Points = Sequence[tuple[float, float]]  # pressures [Pa] and speeds [m/s]
@@ -112,11 +108,8 @@ def design_experiment(
     `SPEED_FACTORS`. If the spread between runs limits the band, the pressures of the readings are proposed once more,
     for another day, and other speeds only if speed was not varied.
 
-    Args:
-        readings: Those at hand.
-        between: Spread between runs; None if it is stated, or if groups left out are runs.
-        of_band: Relative standard deviation between runs that is in the band [-].
-        count: Number of pressures and speeds, without repeated ones.
+    The spread ``between`` runs is None if it is stated, or if groups left out are runs; ``of_band`` is the relative
+    standard deviation between runs in the band [-], ``count`` the number of points without repeated ones.
 
     Source: linear criteria and their greedy (sequential) minimisation are in [AtkinsonDonevTobias2007]_.
     """
@@ -126,17 +119,18 @@ def design_experiment(
         readings = replace(readings, at=at)
     speed, is_varied = np.abs(readings.at.velocity), _is_speed_varied(readings.at)
     used_speeds = _ends(speed) if is_varied else (float(np.median(speed)),)
-    identified, pressures = _pressure_ranges(readings)
+    low, high = float(readings.seal_pressure.min()), float(readings.seal_pressure.max())
+    pressures = (low if are_far_apart(np.array([low, high])) else 0.0, high)
     speeds = _grid_speeds(used_speeds)
     design = _Design(_model(readings, is_varied=is_varied), _range_points(pressures, speeds))
     model = design.model
-    at = design.conditions(_range_points(identified, used_speeds))
+    at = design.conditions(_range_points((low, high), used_speeds))
     law_error = float(np.sqrt(np.mean((model.std(at) / design.friction(at)) ** 2)))
     parts = {RUN_TO_RUN: of_band, LAW: law_error, SCATTER: model.scatter}
-    is_limited_by_runs = _largest(parts) == RUN_TO_RUN
+    is_limited_by_runs = of_band >= max(parts.values())
 
     repeats = _levels(readings, speed) if is_limited_by_runs else []
-    grid = [point for point in _grid(identified[1], speeds) if point not in repeats]
+    grid = [point for point in _grid(high, speeds) if point not in repeats]
     more = [] if is_limited_by_runs and is_varied else grid
     points, errors, information = design.greedy(repeats, more, count)
     before = design.error(design.information)
@@ -297,12 +291,6 @@ def _range_points(pressures: Sequence[float], speeds: Sequence[float]) -> list[t
     """Grid over a range of pressures [Pa] and speeds [m/s]."""
     every = [np.linspace(float(ends[0]), float(ends[-1]), RANGE_POINTS).tolist() for ends in (pressures, speeds)]
     return [(pressure, speed) for pressure in every[0] for speed in every[1]]
-
-
-def _pressure_ranges(readings: FrictionReadings) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Lowest and highest pressure [Pa] of the readings, and of the range: down to 0 if they hold one pressure."""
-    low, high = float(readings.seal_pressure.min()), float(readings.seal_pressure.max())
-    return (low, high), (low if are_far_apart(np.array([low, high])) else 0.0, high)
 
 
 def _correlation_change(before: FloatArray, after: FloatArray, kinds: int) -> CorrelationChange:

@@ -13,16 +13,18 @@ from seal_friction_ros.core.identification.candidate_laws import (
     ParameterValues,
     columns_of,
 )
-from seal_friction_ros.core.identification.friction_model import ModelFit, Told, fit_model
+from seal_friction_ros.core.identification.friction_model import (
+    ASYMMETRY_PRIOR,
+    STRIBECK_PRIOR,
+    STRIBECK_SPEED_PRIOR,
+    ModelFit,
+    Told,
+    fit_model,
+)
 from seal_friction_ros.core.identification.readings import FrictionReadings
 
 ILL_CONDITIONED = 30.0  # condition number of the scaled Jacobian; after [Belsley1980]_
-LINEAR = {
-    'coulomb_friction_at_any_pressure',
-    'friction_at_no_pressure',
-    'friction_at_one_bar',
-    'viscous_friction',
-}
+LINEAR = {'coulomb_friction_at_any_pressure', 'friction_at_no_pressure', 'friction_at_one_bar', 'viscous_friction'}
 """Parameters in which a law is linear, where all its parameters are of them."""
 
 
@@ -89,17 +91,11 @@ def _means_of_sources(readings: FrictionReadings, force: FloatArray) -> FloatArr
     return np.array(means)
 
 
-def fit(
-    law: CandidateLaw,
-    readings: FrictionReadings,
-    start_values: ParameterValues | None = None,
-) -> LawFit:
+def fit(law: CandidateLaw, readings: FrictionReadings, start_values: ParameterValues | None = None) -> LawFit:
     """Least-squares fit of a law, with one offset of the force sum for each source.
 
     The offsets are linear and are eliminated. ``start_values`` are those of a simpler law or of similar readings.
-
-    Raises:
-        ValueError: The result is not finite.
+    ValueError: the result is not finite.
     """
     if law.has_prior:
         return _fit_with_prior(law, readings)
@@ -153,6 +149,17 @@ def values_of_model(law: CandidateLaw, model: ModelFit, seals: int) -> dict[str,
         values |= {f'{name}friction_at_one_bar': rise, f'{name}pressure_exponent': exponent}
     shares = zip(names, model.division.tolist(), strict=False) if law.kinds else ()
     return {p.name: values[p.name] for p in law.parameters} | {f'{name}share': share for name, share in shares}
+
+
+def std_of_none(law: CandidateLaw, model: ModelFit, seals: int) -> dict[str, float]:
+    """Prior standard deviation of each velocity term that is less probable than none, as of `values_of_model`."""
+    found: dict[str, float] = {}
+    if not model.told[model.layout.linear.stop - 1]:
+        found['stribeck_friction'] = STRIBECK_PRIOR[1] * model.size / (1 if law.kinds else seals)
+        found['stribeck_velocity'] = STRIBECK_SPEED_PRIOR[1] * model.stribeck[1]
+    if not model.told[model.layout.asymmetry]:
+        found['asymmetry'] = ASYMMETRY_PRIOR[1]
+    return {name: std for name, std in found.items() if name in law.velocity_terms}
 
 
 def slopes(law: CandidateLaw, values: ParameterValues, at: OperatingConditions) -> FloatArray:

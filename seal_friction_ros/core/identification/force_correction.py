@@ -1,5 +1,6 @@
 """Error of an area in the force sum, found from how its offset follows the pressure."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -13,23 +14,23 @@ NOTICED = 0.1  # of the mean friction: a smaller change of the offset over the p
 
 
 class ForceCorrection(NamedTuple):
-    """Area that the force sum lacks: area * pressure of the chamber is to be added to it."""
+    """Areas that the force sum lacks: area times pressure of each chamber is to be added to it."""
 
-    chamber: str  # a or b, the one under pressure
-    area: float  # [m^2] to be added to the area of the chamber in the force sum, with the sign of its force
-    standard_error: float  # of the area [m^2]
-    line: OffsetLine  # offset of the force sum over pressure
-    is_significant: bool  # whether it is beyond the noise, and large enough to matter
+    areas: tuple[float, float]  # [m^2] to be added to those of chambers a and b, with the sign of their force
+    is_significant: bool  # whether they are beyond the noise, and large enough to matter
+    chamber: str = ''  # a or b, the one under pressure; empty: both areas were fitted together with the friction
+    standard_error: float = math.nan  # of the area of this chamber [m^2]
+    line: OffsetLine | None = None  # offset of the force sum over its pressure
 
     @property
-    def areas(self) -> tuple[float, float]:
-        """Areas to be added to those of chambers a and b [m^2]."""
-        return (self.area, 0.0) if self.chamber == 'a' else (0.0, self.area)
+    def area(self) -> float:
+        """To be added to the area of the one chamber under pressure [m^2]."""
+        return sum(self.areas)
 
     def corrected(self, signals: Signals) -> Signals:
-        """Signals whose force sum has the area corrected; the offset stays, since each source may have its own."""
-        pressure = signals.pressure_a if self.chamber == 'a' else signals.pressure_b
-        return signals._replace(force_sum=signals.force_sum + self.area * pressure)
+        """Signals whose force sum has the areas corrected; the offset stays, since each source may have its own."""
+        change = self.areas[0] * signals.pressure_a + self.areas[1] * signals.pressure_b
+        return signals._replace(force_sum=signals.force_sum + change)
 
 
 def force_correction(prepared: PreparedReadings) -> ForceCorrection | None:
@@ -38,10 +39,8 @@ def force_correction(prepared: PreparedReadings) -> ForceCorrection | None:
     The offset of a level is half the sum of its two directions, in which friction cancels. A wrong area adds a share of
     the pressure to it; a load cell adds a constant. The area counts as wrong if the slope is beyond the noise of the
     line (t-test at `CONFIDENCE`) and changes the offset by more than `NOTICED` of the friction.
-
-    Returns:
-        None for swept logs and manual readings, fewer than three pressures, and if both chambers are under pressure, so
-        that it is not known whose area is wrong.
+    None for swept logs and manual readings, fewer than three pressures, and if both chambers are under pressure, so
+    that it is not known whose area is wrong.
     """
     readings, levels = prepared.readings, prepared.readings.levels
     if not readings.samples or len(levels) < 3:
@@ -58,4 +57,5 @@ def force_correction(prepared: PreparedReadings) -> ForceCorrection | None:
     error = line.rms * float(np.sqrt(len(levels) / freedom / spread))
     sure = abs(line.area_error) > float(stdtrit(freedom, CONFIDENCE)) * error
     large = abs(line.area_error) * float(np.ptp(pressure)) > NOTICED * float(friction.mean())
-    return ForceCorrection('ab'[number], -line.area_error, error, line, bool(sure and large))
+    areas = (-line.area_error, 0.0) if number == 0 else (0.0, -line.area_error)
+    return ForceCorrection(areas, bool(sure and large), 'ab'[number], error, line)

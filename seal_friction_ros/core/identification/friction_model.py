@@ -326,12 +326,9 @@ def fit_model(
 ) -> ModelFit:
     """Most probable parameters and their covariance, with Stribeck friction and asymmetry where they are more probable.
 
-    Args:
-        readings: Of one or several sources.
-        columns: Seals of each kind, as columns of the pressures; empty for a friction without pressure.
-        told: Terms that the readings can tell; the others are 0.
-        chamber_pressures: Of chambers a and b [Pa], shape (n, 2), for errors of the areas.
-        near: Vector of a fit to similar readings, from which this one starts.
+    The ``columns`` of the pressures are the seals of each kind; none for a friction without pressure. Terms that are
+    not ``told`` are 0. The pressures of chambers a and b [Pa], shape (n, 2), give errors of the areas. The fit starts
+    ``near`` the vector of one to similar readings.
     """
     problem = _problem(readings, columns, told, chamber_pressures)
     vector = near if near is not None and len(near) == len(problem.prior) else _start(problem)

@@ -141,16 +141,10 @@ def fit_load(signals: Signals, position: FloatArray, chambers: Sequence[str], sl
     acceleration is a difference of velocities). The number of intervals of the spline and the terms of inertia and
     friction are those with which left-out pairs of strokes are predicted best; of models within one standard error and
     `NEGLIGIBLE_LOSS` of the best, the one with the fewest terms is taken, after [Breiman1984]_; the second bound and
-    the limit `ILL_CONDITIONED` are our choice.
+    the limit `ILL_CONDITIONED` are our choice. ValueError: the load cannot be told from friction; one line with the
+    reason and what to drive.
 
-    Args:
-        signals: Signals of the log; the force sum is p_a A_a - p_b A_b.
-        position: Position of the rod [m], positive on extension, shape (n,).
-        chambers: Chamber (a or b) of each seal.
-        sliding: A rod that is slower than ``slowest`` counts as at rest.
-
-    Raises:
-        ValueError: The load cannot be told from friction; one line with the reason and what to drive.
+    The force sum is p_a A_a - p_b A_b; the position of the rod [m], shape (n,), is positive on extension.
     """
     motion = _strokes(signals, position, sliding)
     low, high = _shared_positions(motion)
@@ -168,12 +162,6 @@ def without_load(signals: Signals, position: FloatArray, load: LoadOverPosition,
     Samples beyond the positions of the load are left out. While the rod moves, velocity, pressures and the force that
     is left are centred means over `averaging_window` within one motion, and one sample is kept in a quarter of
     `MEAN_OVER`: the noise of two pressures times their areas is often as large as the friction (our choice).
-
-    Args:
-        signals: Signals of the log, with load.
-        position: Position [m], shape (n,).
-        load: From `fit_load`.
-        sliding: A rod that is slower than ``slowest`` counts as at rest.
     """
     inertia = inertia_at(load, position, signals.velocity, np.gradient(signals.velocity, signals.time))
     force = signals.force_sum - load_at(load, position) - inertia
@@ -532,10 +520,10 @@ def _check_same_load(model: _Model, means: _Means, load: LoadOverPosition) -> No
     of_load = model.columns[:, :k] @ load.forces
     masses = np.array([load.mass, *load.mass_change])[: model.inertia]
     residual = means.force - of_load - model.columns[:, k:] @ np.concatenate((masses, load.friction.values))
-    strokes = np.unique(means.stroke)
-    direction = np.array([means.direction[means.stroke == s][0] for s in strokes])
-    mean = np.array([np.average(residual[inside], weights=means.counts[inside]) for inside in _each(means, strokes)])
-    scatter = np.array([residual[inside].std() / np.sqrt(inside.sum()) for inside in _each(means, strokes)])
+    of_strokes = [means.stroke == stroke for stroke in np.unique(means.stroke)]
+    direction = np.array([means.direction[inside][0] for inside in of_strokes])
+    mean = np.array([np.average(residual[inside], weights=means.counts[inside]) for inside in of_strokes])
+    scatter = np.array([residual[inside].std() / np.sqrt(inside.sum()) for inside in of_strokes])
     next_is_back = np.flatnonzero(direction[:-1] != direction[1:])
     offsets = (mean[next_is_back] + mean[next_is_back + 1]) / 2.0
     errors = np.hypot(scatter[next_is_back], scatter[next_is_back + 1])  # twice that of white noise: rows correlate
@@ -548,7 +536,3 @@ def _check_same_load(model: _Model, means: _Means, load: LoadOverPosition) -> No
             f'the load changes between strokes by {span:.3g} N (mean load {size:.3g} N), so it is no function of '
             'position: drive all strokes with one load, and put logs with another load in files of their own'
         )
-
-
-def _each(means: _Means, strokes: IntArray) -> list[BoolArray]:
-    return [means.stroke == stroke for stroke in strokes]

@@ -41,8 +41,7 @@ _Rows = Sequence[tuple[int, signal_preparation.SignalReading]]
 def prepare_logs(logs: Sequence[RecordedLog], chambers: Sequence[str]) -> PreparedReadings:
     """Readings from logs, one for each source; ``chambers`` (of `CHAMBERS`) are those of the seals.
 
-    Raises:
-        ValueError: A log is unfit for identification; one line with the reason and what to measure instead.
+    ValueError: a log is unfit for identification; one line with the reason and what to measure instead.
     """
     for log in logs:
         check_log(log)
@@ -207,8 +206,7 @@ def prepare_manual_readings(
 ) -> PreparedReadings:
     """Readings from manual readings of seals that share the pressure: running friction, and breakaway friction if any.
 
-    Raises:
-        ValueError: The readings are unfit for identification; one line with the reason and what to do.
+    ValueError: the readings are unfit for identification; one line with the reason and what to do.
     """
     for manual in (*dynamic, *static):
         check_manual_readings(manual)

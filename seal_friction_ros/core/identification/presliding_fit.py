@@ -29,6 +29,7 @@ from scipy.optimize import least_squares
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.friction.presliding import SLOTS, Presliding
+from seal_friction_ros.core.identification.validation import jackknife_errors
 
 FEWEST_REVERSALS = 4  # of one log, in each half of them
 STEPS_PER_LENGTH = 5.0  # [-] steps of the position that the presliding length must have
@@ -203,11 +204,8 @@ def friction_after_reversal(
 ) -> FloatArray:
     """Friction in the direction of the motion after the reversal [N], shape (n,): the equation at the top.
 
-    Args:
-        parameters: ln K, p, epsilon, ln L, ln tau; a ln tau of -inf: no dwell.
-        displacement: Since the reversal [m], shape (n,).
-        friction: f_c [N], shape (n,) or a number.
-        rest: At the reversal [s], likewise.
+    Parameters are those `SHARED`, where a ln tau of -inf is no dwell; the displacement [m] since the reversal has the
+    shape (n,); friction f_c [N] and rest [s] at the reversal likewise, or they are numbers.
     """
     log_stiffness, exponent, excess, log_length, log_dwell = parameters
     shares = ((np.arange(SLOTS) + 0.5) / SLOTS) ** exponent
@@ -277,9 +275,8 @@ def _standard_errors(solution: _Solution, samples: _Samples) -> FloatArray:
         inside = group == number
         left = normal - j[inside].T @ j[inside]
         steps.append(np.linalg.lstsq(left, j[inside].T @ r[inside], rcond=None)[0])
-    deviations = np.array(steps) - np.mean(steps, axis=0)
     errors = np.full(len(solution.parameters), np.nan)
-    errors[solution.free] = np.sqrt((groups - 1) / groups * np.sum(deviations**2, axis=0))
+    errors[solution.free] = jackknife_errors(np.array(steps))
     return errors
 
 
@@ -313,8 +310,7 @@ def _full_yield(presliding: Presliding, friction: float) -> float:
 def fit_presliding(logs: Sequence[ReversalLog]) -> PreslidingFit:
     """Fit the elasticity of all seals together to all reversals; the length of the curves follows from the fit.
 
-    Raises:
-        PreslidingRefusedError: There are too few reversals, the position is too coarse, or the elasticity is not told.
+    PreslidingRefusedError: there are too few reversals, the position is too coarse, or the elasticity is not told.
     """
     names, length = [log.name for log in logs], half_stroke(logs)
     fit = fit_curves(reversal_curves(logs, length), names, length)
@@ -337,11 +333,7 @@ def fit_presliding(logs: Sequence[ReversalLog]) -> PreslidingFit:
 
 
 def half_stroke(logs: Sequence[ReversalLog]) -> float:
-    """Half of the median stroke [m], the least over the logs.
-
-    Raises:
-        PreslidingRefusedError: A log has too few reversals.
-    """
+    """Half of the median stroke [m], the least over the logs. PreslidingRefusedError: a log has too few reversals."""
     lengths = []
     for log in logs:
         spread = float(np.ptp(log.position))
@@ -359,10 +351,8 @@ def half_stroke(logs: Sequence[ReversalLog]) -> float:
 def fit_curves(curves: Sequence[ReversalCurve], names: Sequence[str], length: float) -> PreslidingFit:
     """Fit the elasticity to some reversals of the logs called ``names``, whose curves are ``length`` [m] long.
 
-    Lag and dwell are taken where the logs tell them.
-
-    Raises:
-        PreslidingRefusedError: There are too few reversals, or the elasticity is not told.
+    Lag and dwell are taken where the logs tell them. PreslidingRefusedError: there are too few reversals, or the
+    elasticity is not told.
     """
     starts = _checked_starts(curves, names, FEWEST_REVERSALS)
     samples = _samples(curves)
@@ -441,13 +431,9 @@ def _parameters_of(fit: PreslidingFit) -> FloatArray:
 def score_presliding(logs: Sequence[ReversalLog], length: float, within: float) -> PreslidingScore:
     """Fit every second reversal of each log and predict the others.
 
-    Args:
-        logs: The logs.
-        length: Of the curves [m], from `PreslidingFit`.
-        within: Displacement up to which the errors count [m]; at most ``length``.
+    PreslidingRefusedError: half of the reversals do not tell the elasticity.
 
-    Raises:
-        PreslidingRefusedError: Half of the reversals do not tell the elasticity.
+    The curves have the ``length`` of `PreslidingFit` [m]; errors count ``within`` a displacement of at most that [m].
     """
     curves = reversal_curves(logs, length)
     seen, unseen = [], []

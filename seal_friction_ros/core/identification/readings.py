@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -64,6 +64,13 @@ class ManualReadings(NamedTuple):
     dwell: FloatArray | None = None  # [s] time at rest before; None if not noted
 
 
+_COLUMNS = ('force', 'source', 'group', 'level', 'travel', 'dwell', 'temperature', 'chamber_pressures')
+
+
+def _unknown() -> FloatArray:
+    return np.empty(0)
+
+
 @dataclass(frozen=True, eq=False)
 class FrictionReadings:
     """n friction readings of one rig, from one or several sources."""
@@ -77,14 +84,10 @@ class FrictionReadings:
     left_out_by: str  # meaning of ``group``: test, pressure, file or block
     are_samples: bool  # samples of a swept log; otherwise strokes or manual readings at held pressures
     samples: tuple[FloatArray, ...] = ()  # [N] force sums behind each reading; empty if there is only the reading
-    travel: FloatArray = field(default_factory=lambda: np.empty(0))
-    """[m] way of the rod since the start of its source, shape (n,); empty if unknown"""
-    dwell: FloatArray = field(default_factory=lambda: np.empty(0))
-    """[s] time at rest before each breakaway, shape (n,); empty if unknown"""
-    temperature: FloatArray = field(default_factory=lambda: np.empty(0))
-    """[K] of each reading, shape (n,); empty if unknown"""
-    chamber_pressures: FloatArray = field(default_factory=lambda: np.empty(0))
-    """[Pa] of chambers a and b, shape (n, 2); empty for one kind of seals"""
+    travel: FloatArray = field(default_factory=_unknown)  # [m] of the rod since the start of its source, shape (n,)
+    dwell: FloatArray = field(default_factory=_unknown)  # [s] time at rest before each breakaway, shape (n,)
+    temperature: FloatArray = field(default_factory=_unknown)  # [K] shape (n,)
+    chamber_pressures: FloatArray = field(default_factory=_unknown)  # [Pa] of a and b, (n, 2); empty for one kind
     kinds: tuple[SealKind, ...] = ()  # of the seals, in the order of the pressures; empty: one kind
     free_rod: FreeRod | None = None  # if the pressures are the effect of the friction, and tell nothing of it
 
@@ -126,19 +129,10 @@ class FrictionReadings:
     def taken(self, index: BoolArray | IntArray) -> 'FrictionReadings':
         """The readings in ``index``."""
         where = np.arange(self.count)[index]
-        return replace(
-            self,
-            at=self.at.taken(where),
-            force=self.force[where],
-            source=self.source[where],
-            group=self.group[where],
-            level=self.level[where],
-            samples=tuple(self.samples[i] for i in where) if self.samples else (),
-            travel=self.travel[where] if len(self.travel) else self.travel,
-            dwell=self.dwell[where] if len(self.dwell) else self.dwell,
-            temperature=self.temperature[where] if len(self.temperature) else self.temperature,
-            chamber_pressures=self.chamber_pressures[where] if self.kinds else self.chamber_pressures,
-        )
+        columns = {name: getattr(self, name) for name in _COLUMNS}
+        chosen: dict[str, Any] = {name: column[where] for name, column in columns.items() if len(column)}
+        samples = tuple(self.samples[i] for i in where) if self.samples else ()
+        return replace(self, at=self.at.taken(where), samples=samples, **chosen)
 
     @cached_property
     def splits(self) -> list[tuple['FrictionReadings', 'FrictionReadings']]:
@@ -259,9 +253,8 @@ class PreparedReadings(NamedTuple):
 def check_log(log: RecordedLog) -> None:
     """Check a log.
 
-    Raises:
-        ValueError: Too few samples, missing or impossible values, no motion, motion in one direction only, or a clipped
-            sensor.
+    ValueError: too few samples, missing or impossible values, no motion, motion in one direction only, or a clipped
+    sensor.
     """
     name, signals, sliding, *_ = log
     if len(signals.time) < 20:
@@ -317,10 +310,7 @@ def check_log(log: RecordedLog) -> None:
 def check_clipping(name: str, what: str, column: FloatArray, *, is_pressure: bool = False) -> None:
     """Check the signal ``what`` of the source ``name``: samples while the rod moves, shape (n,); a pressure in Pa.
 
-    A pressure may stand at that of the air: a vented chamber does.
-
-    Raises:
-        ValueError: The sensor is clipped.
+    A pressure may stand at that of the air: a vented chamber does. ValueError: the sensor is clipped.
     """
     low_is_real = is_pressure and is_ambient(float(np.nanmin(column, initial=np.inf)))  # a vented chamber
     share = clipped_share(column, low_is_real=low_is_real)
@@ -333,11 +323,7 @@ def check_clipping(name: str, what: str, column: FloatArray, *, is_pressure: boo
 
 
 def check_manual_readings(manual: ManualReadings) -> None:
-    """Check manual readings.
-
-    Raises:
-        ValueError: Missing values, too few readings, negative friction, or impossible values.
-    """
+    """Check manual readings. ValueError: missing values, too few readings, negative friction, or impossible values."""
     for what, column in (('pressure', manual.pressure), ('friction', manual.friction)):
         wrong = int(np.count_nonzero(~np.isfinite(column)))
         if wrong:
@@ -409,8 +395,7 @@ def _check_pressures(where: str, readings: FrictionReadings) -> None:
 def check_readings(readings: FrictionReadings) -> None:
     """Check that a law can be fitted to readings.
 
-    Raises:
-        ValueError: Negative friction, or forces and pressures that do not belong to one seal.
+    ValueError: negative friction, or forces and pressures that do not belong to one seal.
     """
     where = ', '.join(readings.names)
     _check_pressures(where, readings)

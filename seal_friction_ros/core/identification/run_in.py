@@ -140,15 +140,8 @@ class SettledReadings(NamedTuple):
 def settled_readings(readings: FrictionReadings, offsets: FloatArray) -> SettledReadings | None:
     """Readings of the settled seal: the friction of each run with an evident drift, times its settled share.
 
-    The standard deviation of the settled shares counts as common to all pressures: they are extrapolated by one model
-    (our choice).
-
-    Args:
-        readings: As measured.
-        offsets: Of the force sum of each source [N], shape (sources,).
-
-    Returns:
-        None for swept logs, and where no drift is evident.
+    None for swept logs, and where no drift is evident. The standard deviation of the settled shares counts as common to
+    all pressures: they are extrapolated by one model (our choice).
     """
     of_runs = [] if readings.are_samples else drifts(readings, offsets)
     if not any(drift.is_evident for drift in of_runs):

@@ -38,11 +38,7 @@ def between_runs(readings: FrictionReadings, friction: FloatArray, offsets: Floa
     std^2 = (nu_0 s_0^2 + nu s^2) / (nu_0 + nu): the scale of a scaled inverse chi-squared posterior with the prior
     s_0 = `PRIOR_STD` of weight nu_0 = `PRIOR_FREEDOM`, where s is measured with nu degrees of freedom. The conjugate
     prior of a variance is in [Gelman2013]_, section 2.6; its numbers are our choice.
-
-    Args:
-        readings: Readings of one or several runs.
-        friction: By the law that was fitted to all of them [N], shape (n,).
-        offsets: Of the force sum of each source [N], shape (sources,).
+    ``friction`` [N], shape (n,), and ``offsets`` of the sources [N] are by the law that was fitted to all runs.
     """
     squares, freedom = 0.0, 0
     if readings.are_samples:
@@ -62,11 +58,6 @@ def shares_of_law(readings: FrictionReadings, friction: FloatArray, offsets: Flo
     r"""Source -> its friction as a share of a law that was fitted to all sources [-], by least squares.
 
     .. math:: \min_s \sum_i (F_i - s f_i)^2
-
-    Args:
-        readings: Of several runs.
-        friction: By the law [N], shape (n,).
-        offsets: Of the force sum of each source [N], shape (sources,).
     """
     measured = readings.magnitudes(offsets)
     each = {int(source): readings.source == source for source in np.unique(readings.source)}

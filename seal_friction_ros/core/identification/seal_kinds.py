@@ -17,9 +17,10 @@ from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.mounting import pressures_at_seals
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions, SealKind, columns_of
+from seal_friction_ros.core.identification.force_correction import ForceCorrection
 from seal_friction_ros.core.identification.friction_model import ModelFit, Told, fit_model
 from seal_friction_ros.core.identification.readings import NARROWEST_PRESSURES, FrictionReadings, numbered
-from seal_friction_ros.core.identification.signal_preparation import Signals, held_pressures, pressure_levels
+from seal_friction_ros.core.identification.signal_preparation import held_pressures, pressure_levels
 
 TOGETHER = 0.98  # correlation of the pressures of the kinds above which they moved together (our choice)
 LARGEST_KIND_ERROR = 0.10  # of the friction of a kind: standard error up to which it is told apart (our choice)
@@ -51,26 +52,14 @@ def kinds_readings(
     return replace(found, level=condition, group=condition, left_out_by='pressure')
 
 
-class AreaErrors(NamedTuple):
-    """Areas that the force sum lacks."""
-
-    areas: tuple[float, float]  # [m^2] to be added to those of chambers a and b
-    is_significant: bool  # whether one of them is beyond `SURE_AREA`
-
-    def corrected(self, signals: Signals) -> Signals:
-        """Signals whose force sum has the areas corrected."""
-        change = self.areas[0] * signals.pressure_a + self.areas[1] * signals.pressure_b
-        return signals._replace(force_sum=signals.force_sum + change)
-
-
-def area_errors(readings: FrictionReadings, told: Told) -> AreaErrors | None:
+def area_errors(readings: FrictionReadings, told: Told) -> ForceCorrection | None:
     """Errors of the areas in the force sum, fitted together with the terms ``told``; None if no pressure swung."""
     if not (np.ptp(readings.chamber_pressures, axis=0) > NARROWEST_PRESSURES).any():
         return None
     columns = [columns_of(readings.kinds, number) for number in range(len(readings.kinds))]
     model = fit_model(readings, columns, told._replace(areas=True), readings.chamber_pressures)
     area_a, area_b = (-model.areas).tolist()
-    return AreaErrors((area_a, area_b), model.surest_area > SURE_AREA)
+    return ForceCorrection((area_a, area_b), model.surest_area > SURE_AREA)
 
 
 class ToldApart(NamedTuple):
@@ -205,8 +194,7 @@ def advice(readings: FrictionReadings, model: ModelFit | None = None) -> str:
 def check_kinds(readings: FrictionReadings) -> None:
     """Check that the pressures of the kinds were varied, and independently.
 
-    Raises:
-        ValueError: A kind sees one pressure only, or pressures moved together; what to measure.
+    ValueError: a kind sees one pressure only, or pressures moved together; what to measure.
     """
     where, kinds = ', '.join(readings.names), readings.kinds
     for number, kind in enumerate(kinds):
@@ -247,11 +235,7 @@ def _check_not_by_one(readings: FrictionReadings, where: str) -> None:
 def poorly_told_apart(
     found: ToldApart, kinds: Sequence[SealKind], largest_error: float = LARGEST_KIND_ERROR
 ) -> list[tuple[str, float, float]]:
-    """Kinds whose standard error is larger than that share of their friction, and not small beside all friction.
-
-    Returns:
-        Name, friction [N] and its standard error [N] of each.
-    """
+    """Kinds with a standard error above that share of their friction, and not small: name, friction and error [N]."""
     small = SMALL_ERROR * float(found.friction.sum())
     return [
         (kind.name, friction, error)
@@ -263,11 +247,7 @@ def poorly_told_apart(
 def check_told_apart(
     found: ToldApart, model: ModelFit, readings: FrictionReadings, largest_error: float = LARGEST_KIND_ERROR
 ) -> None:
-    """Check the standard error of each kind.
-
-    Raises:
-        ValueError: It is too large; what to measure.
-    """
+    """Check the standard error of each kind. ValueError: it is too large; what to measure."""
     poor = poorly_told_apart(found, readings.kinds, largest_error)
     if poor:
         name, friction, error = poor[0]

@@ -1,11 +1,11 @@
 """Choice of a law: every candidate is scored on readings left out of its fit, and the simplest that suffices is taken.
 
-Four pressures give four numbers to compare two laws by, which has no power: a law that is off twice as much is beaten
-without a test, and whether friction rises with pressure at all is told by a line. A law whose parameters the data do
-not determine is not recommended while a sound one is near.
+Four pressures give four numbers to compare two laws by, which has no power: whether friction rises with pressure at all
+is told by a line. A law whose parameters the data do not determine is not recommended while a sound one is near.
 """
 
 import math
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -28,7 +28,6 @@ from seal_friction_ros.core.identification.validation import CrossValidation, Ti
 
 BEATEN_CONFIDENCE = 0.95  # of the test whether a law is beaten (our choice)
 WORTHWHILE = 0.1  # share of its loss by which a law must be beaten (our choice)
-MANY_TIMES = 2.0  # a law whose loss is as many times that of another is beaten, however few the groups (our choice)
 BETTER = 0.05  # share of its loss by which all terms with a prior are better than the best law (our choice)
 NEAR = 2.0  # a sound law is near if its loss is at most as many times that of the best (our choice)
 RISES = 2.0  # standard errors of the rise over the pressures from which friction rises (our choice)
@@ -110,11 +109,7 @@ Scores = Sequence[LawScore | NotScored]
 
 
 def scored(scores: Scores) -> list[LawScore]:
-    """The laws that could be fitted.
-
-    Raises:
-        ValueError: There is none; with the reasons.
-    """
+    """The laws that could be fitted. ValueError: there is none; with the reasons."""
     found = [score for score in scores if isinstance(score, LawScore)]
     if not found:
         reasons = '; '.join(f'{score.law.name}: {score.why_not}' for score in scores if isinstance(score, NotScored))
@@ -193,10 +188,7 @@ def recommended(scores: Scores, *, rises: bool = False) -> LawScore:
 
     Laws whose parameters are at a bound or ill-conditioned only compete if no sound law is `NEAR`. Where friction
     ``rises`` (`rises_over_pressures`), a law without pressure and speed does not compete. Of laws with equally many
-    parameters the one with the smallest mean loss is taken.
-
-    Raises:
-        ValueError: No law was fitted.
+    parameters the one with the smallest mean loss is taken. ValueError: no law was fitted.
 
     Source: after the one-standard-error rule of [Breiman1984]_; the rest is our choice.
     """
@@ -214,7 +206,7 @@ def recommended(scores: Scores, *, rises: bool = False) -> LawScore:
         return best
     left = [score for score in left if not score.law.has_prior] or left
     best = min(left, key=_mean_loss)
-    left = [score for score in left if not is_beaten(score.losses, best.losses, many_times=True)]
+    left = [score for score in left if not is_beaten(score.losses, best.losses)]
     fewest = min(len(score.law.parameters) for score in left)
     return min((score for score in left if len(score.law.parameters) == fewest), key=_mean_loss)
 
@@ -223,21 +215,17 @@ def _mean_loss(score: LawScore) -> float:
     return score.mean_loss
 
 
-def is_beaten(losses: FloatArray, others: FloatArray, *, many_times: bool = False) -> bool:
+def is_beaten(losses: FloatArray, others: FloatArray) -> bool:
     """Whether the losses of another law are lower beyond the noise, and by enough to justify a term.
 
-    Beyond the noise: by a one-sided paired t-test at `BEATEN_CONFIDENCE`. Enough: `WORTHWHILE` of the mean loss.
-    With ``many_times``, a loss `MANY_TIMES` as large is beaten without a test. Losses are those of each group, shape
-    (groups >= 2,).
+    Beyond the noise: by a one-sided paired t-test at `BEATEN_CONFIDENCE`. Enough: `WORTHWHILE` of the mean loss. Losses
+    are those of each group, shape (groups >= 2,).
     """
     difference = losses - others
     groups = len(difference)
     error = float(difference.std(ddof=1)) / math.sqrt(groups)
     noise = float(stdtrit(groups - 1, BEATEN_CONFIDENCE)) * error
-    worse = float(difference.mean())
-    if many_times and float(losses.mean()) > MANY_TIMES * float(others.mean()) > 0.0:
-        return True
-    return worse > max(noise, WORTHWHILE * float(losses.mean()))
+    return float(difference.mean()) > max(noise, WORTHWHILE * float(losses.mean()))
 
 
 class ChosenAnew(NamedTuple):
@@ -258,12 +246,10 @@ Chosen = Callable[[Sequence[Callable[[], LeftOut]]], Sequence[LeftOut]]
 """runs independent calls and returns their results in order"""
 
 
-def _in_turn(calls: Sequence[Callable[[], LeftOut]]) -> list[LeftOut]:
-    return [call() for call in calls]
-
-
 def choose_anew(
-    readings: FrictionReadings, choose: Callable[[FrictionReadings], LawScore], run: Chosen = _in_turn
+    readings: FrictionReadings,
+    choose: Callable[[FrictionReadings], LawScore],
+    run: Chosen = lambda calls: list(map(operator.call, calls)),
 ) -> ChosenAnew:
     """Predict each group by the law that ``choose`` recommends for the other groups.
 

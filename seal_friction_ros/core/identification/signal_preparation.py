@@ -102,10 +102,8 @@ def slope(time: FloatArray, values: FloatArray, law: SavitzkyGolay) -> FloatArra
     it has samples, filtered, and interpolated back.
 
     Samples of ``values`` that are not finite are left out. The slope, in units of ``values`` per second, shape (n,), is
-    NaN there and in segments shorter than the window.
-
-    Raises:
-        ValueError: No segment is as long as the window, or the window holds too few samples for the order.
+    NaN there and in segments shorter than the window. ValueError: no segment is as long as the window, or the window
+    holds too few samples for the order.
 
     Source: [SavitzkyGolay1964]_; grid, gaps and edges are our choice.
     """
@@ -228,9 +226,7 @@ def half_range(force: FloatArray, direction: IntArray, *, of_medians: bool = Tru
 
     friction = (F_extend - F_retract) / 2, offset = (F_extend + F_retract) / 2 of the force [N], shape (n,), with the
     median of each direction (-1 or 1) for samples that include transitions, or the mean for single readings.
-
-    Raises:
-        ValueError: One direction is missing.
+    ValueError: one direction is missing.
     """
     both = [force[direction == side] for side in (1, -1)]
     if not all(len(side) for side in both):

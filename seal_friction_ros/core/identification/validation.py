@@ -191,10 +191,7 @@ def deviations_in_std(
 
 
 def deviations_of_left_out(
-    law: CandidateLaw,
-    readings: FrictionReadings,
-    near: ParameterValues,
-    tick: Ticks = lambda _: None,
+    law: CandidateLaw, readings: FrictionReadings, near: ParameterValues, tick: Ticks = lambda _: None
 ) -> FloatArray:
     """Deviations of each group over the standard deviation of a band that was made without it [-], shape (n,).
 
@@ -209,10 +206,7 @@ def deviations_of_left_out(
 
 
 def band_coverage(
-    law: CandidateLaw,
-    readings: FrictionReadings,
-    near: ParameterValues,
-    tick: Ticks = lambda _: None,
+    law: CandidateLaw, readings: FrictionReadings, near: ParameterValues, tick: Ticks = lambda _: None
 ) -> float:
     """Share of the readings inside a 95 % band that was made without them [-], as of `deviations_of_left_out`."""
     return float(np.mean(deviations_of_left_out(law, readings, near, tick) <= BAND_95))

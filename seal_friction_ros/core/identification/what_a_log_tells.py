@@ -35,11 +35,8 @@ def free_rod(logs: Sequence[Signals], even: Sequence[BoolArray]) -> FreeRod | No
 
     The force sum of all logs is compared with one linear function of the pressures. If that leaves less than `ALONE` of
     the friction, the pressures contain it. They still tell its dependence on pressure, if the emptied chamber moved
-    beyond what its speed explains by more than the pressure that the friction takes.
-
-    Args:
-        logs: Signals of each log.
-        even: Which samples are even sliding, shape (n,) each; those of both directions are needed.
+    beyond what its speed explains by more than the pressure that the friction takes. Samples ``even`` are those of even
+    sliding, shape (n,) of each log, in both directions.
     """
     parts = [log.taken(inside) for log, inside in zip(logs, even, strict=True)]
     velocity, a, b, force = (np.concatenate(columns) for columns in zip(*(part[1:] for part in parts), strict=True))

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
+from seal_friction_ros.core.identification.validation import jackknife_errors
 
 AVERAGE = 0.02  # [s] of the moving average
 FEWEST_SAMPLES = 500  # of a fit
@@ -72,7 +73,7 @@ def output_gain(record: CommandRecord) -> OutputGain:
     found = _robust_fit(inputs, command, np.ones(len(command), dtype=bool))
     blocks = np.arange(len(command)) * BLOCKS // len(command)
     left_out = np.array([_robust_fit(inputs, command, blocks != block)[0] for block in range(BLOCKS)])
-    error = float(np.sqrt((BLOCKS - 1) / BLOCKS * np.sum((left_out - left_out.mean()) ** 2)))
+    error = float(jackknife_errors(left_out[:, np.newaxis])[0])
     gain = float(found[0])
     said = f'the gain is {gain:.3g} per N'
     if not error <= LARGEST_ERROR * abs(gain):

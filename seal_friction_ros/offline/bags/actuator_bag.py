@@ -115,6 +115,7 @@ class ActuatorBag(NamedTuple):
     actuator: str = ''  # of a machine; empty: the bag has the messages of one actuator
     several: bool = False  # whether the machine has other actuators
     mapping: MappingFile | None = None  # of a bag without configuration
+    velocity_source: str = ''  # topic that the velocity of an actuator of a machine is made of
 
     @property
     def name(self) -> str:
@@ -132,11 +133,17 @@ class ActuatorBag(NamedTuple):
         """Number of messages in the bag."""
         return sum(info.message_count for info in self.infos.values())
 
-    def messages(self, *, with_answers: bool = False) -> Iterator[rosbag.BagMessage]:
-        """Messages in order of log time, with estimates by a mapping file if wanted; BagError where it is damaged."""
+    def messages(
+        self, *, with_answers: bool = False, malformed: Counter[str] | None = None
+    ) -> Iterator[rosbag.BagMessage]:
+        """Messages in order of log time, with estimates by a mapping file if wanted; BagError where it is damaged.
+
+        ``malformed`` counts by topic the messages of a machine that could not be read.
+        """
         if not self.actuator:
             return rosbag.read_messages(self.path)
-        return _OfActuator(self).messages(machine_messages(self.path, self.mapping, with_answers=with_answers))
+        found = _OfActuator(self, Counter() if malformed is None else malformed)
+        return found.messages(machine_messages(self.path, self.mapping, with_answers=with_answers))
 
     def blocks(self, kind_of: rosbag.KindOf) -> Iterator[Messages]:
         """Messages in blocks, by the compiler, which reads bags of this project many times faster.
@@ -188,7 +195,8 @@ def _opened(
     topics = _topics_of(actuator, infos, has_mapping=mapping is not None)
     if not topics.velocity:
         raise rosbag.BagError(no_velocity(bag, actuator.name))
-    return ActuatorBag(bag, topics, infos, actuator.name, count > 1, mapping)
+    (source,) = sources_of(actuator)['velocity']
+    return ActuatorBag(bag, topics, infos, actuator.name, count > 1, mapping, source)
 
 
 def recorded_machine(bag: Path, infos: Mapping[str, rosbag.TopicInfo]) -> MachineSnapshot | None:
@@ -268,8 +276,8 @@ def _is_of(actuator: str, topic: str) -> bool:
 class _OfActuator:
     """Messages of one actuator from those of its machine."""
 
-    def __init__(self, source: ActuatorBag) -> None:
-        self._bag, self._name, self._topics = source.path, source.actuator, source.topics
+    def __init__(self, source: ActuatorBag, malformed: Counter[str]) -> None:
+        self._bag, self._name, self._topics, self._malformed = source.path, source.actuator, source.topics, malformed
         self._did_not_act = source.mapping is not None or any(
             _is_of(self._name, topic) and topic.endswith(RECORDED) for topic in source.infos
         )
@@ -309,7 +317,7 @@ class _OfActuator:
         known = parse_machine_text(coder.decode_text(message.data))
         if self._name not in known.actuators:
             raise ValueError(f'no {self._name} in the configuration: {", ".join(known.actuators)}')
-        self._translation = Translation(*_machine_of(self._bag, known), self._name)
+        self._translation = Translation(*_machine_of(self._bag, known), self._name, self._malformed)
         snapshot = known.actuators[self._name].snapshot
         if self._did_not_act:
             snapshot = snapshot._replace(recorded=Recorded(None))

@@ -6,6 +6,7 @@ memory for what is kept alone. Long bags of this project are read in bulk, other
 
 import math
 from array import array
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from typing import NamedTuple, Protocol, TypeVar
@@ -16,6 +17,7 @@ from seal_friction_ros.core.estimation.configuration import Configuration, parse
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.foundation.compiled import has_compiler
 from seal_friction_ros.core.foundation.errors import named_errors
+from seal_friction_ros.core.identification.admission import MALFORMED, NO_VELOCITY
 from seal_friction_ros.core.messages.blocks import Messages, Numbers, UnsuitedError, numbers_of
 from seal_friction_ros.core.messages.coder import decode_text
 from seal_friction_ros.offline.bags.actuator_bag import TYPES, ActuatorBag
@@ -137,6 +139,7 @@ class VelocityRows(NamedTuple):
     """shape (7, n), in the units of the messages: velocity, both pressures, force sum, position, temperature and its
     variance; NaN before the first message"""
     configuration: Configuration | None  # the last one
+    left_out: Mapping[str, int] = {}  # reason -> messages on the topic of the velocity that made none
 
 
 def wanted_of(bag: ActuatorBag, names: Iterable[str]) -> dict[str, Wanted]:
@@ -146,8 +149,14 @@ def wanted_of(bag: ActuatorBag, names: Iterable[str]) -> dict[str, Wanted]:
 
 def read_velocity_rows(bag: ActuatorBag, *, bulk_from: int = BULK_FROM) -> VelocityRows:
     """Each velocity sample with what came newest of the other inputs before it; raises as `collected`."""
-    wanted = wanted_of(bag, (*INPUTS, 'configuration'))
-    return collected(bag, wanted, _VelocityCollector, bulk_from=bulk_from).rows()
+    wanted, malformed = wanted_of(bag, (*INPUTS, 'configuration')), Counter[str]()
+    given = bag.messages(malformed=malformed) if bag.velocity_source else None
+    rows = collected(bag, wanted, _VelocityCollector, messages=given, bulk_from=bulk_from).rows()
+    if given is None:
+        return rows
+    count, unread = bag.infos[bag.velocity_source].message_count, malformed[bag.velocity_source]
+    left_out = {MALFORMED: unread, NO_VELOCITY: count - unread - len(rows.stamps)}
+    return rows._replace(left_out={reason: number for reason, number in left_out.items() if number})
 
 
 class _VelocityCollector:

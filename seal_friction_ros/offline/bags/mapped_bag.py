@@ -127,9 +127,11 @@ class Translation:
     made; empty: all. ``malformed`` counts the messages that could not be read, by topic.
     """
 
-    def __init__(self, machine: Machine, state: MachineState, only: str = '') -> None:
+    def __init__(
+        self, machine: Machine, state: MachineState, only: str = '', malformed: Counter[str] | None = None
+    ) -> None:
         self._actuators, self._states = machine.actuators, list(state.actuators)
-        self.malformed: Counter[str] = Counter()
+        self.malformed: Counter[str] = Counter() if malformed is None else malformed
         self._plans = {
             topic: plan._replace(taken=tuple(one for one in plan.taken if only in ('', machine.actuators[one[0]].name)))
             for topic, plan in machine.plans.items()

@@ -54,8 +54,7 @@ PROCEDURE = (
 class FrictionTestPlan:
     """Readings to be taken, at evenly spaced pressures or at given pressures and speeds.
 
-    Raises:
-        ValueError: A value is invalid.
+    ValueError: a value is invalid.
     """
 
     seal_name: str
@@ -149,8 +148,7 @@ def columns(tests: int) -> list[SheetColumn]:
 def geometry_of_seal_file(seal: str) -> tuple[SealGeometry, Mapping[str, Any]]:
     """Geometry in a seal file (a path, or the name of one in config/seals), and its whole document.
 
-    Raises:
-        ValueError: The file cannot be read or has no valid geometry; names it.
+    ValueError: the file cannot be read or has no valid geometry; names it.
     """
     path = config_path('seals', seal)
     document = read_yaml(path)
@@ -187,15 +185,9 @@ def write_sheet(plan: FrictionTestPlan, out: Path) -> None:
 
 
 def write_new_csv(text: str, out: Path, hint: str = '') -> None:
-    """Write a CSV file that a person works on.
+    """Write a CSV file that a person works on; the error about another suffix adds the ``hint``.
 
-    Args:
-        text: The file.
-        out: Where; it does not exist yet.
-        hint: What the error about another suffix adds.
-
-    Raises:
-        ValueError: ``out`` exists already and may be filled in, or it cannot be written.
+    ValueError: ``out`` exists already and may be filled in, or it cannot be written.
     """
     if out.suffix != '.csv':
         raise ValueError(f'{out}: name it .csv{hint and f"; {hint}"}')
@@ -221,9 +213,8 @@ class _Reading(NamedTuple):
 def read_data_sheet(path: Path) -> DataSheet:
     """Read and check a filled sheet.
 
-    Raises:
-        ValueError: A dimension or reading is missing, out of order or implausible; one line that names it and says
-            what to do.
+    ValueError: a dimension or reading is missing, out of order or implausible; one line that names it and says what to
+    do.
     """
     lines = []
     for number, line in enumerate(read_text(path).splitlines(), start=1):
@@ -255,11 +246,7 @@ def read_data_sheet(path: Path) -> DataSheet:
 
 
 def read_text(path: Path) -> str:
-    """Text of a file.
-
-    Raises:
-        ValueError: It cannot be read as text; names it.
-    """
+    """Text of a file. ValueError: it cannot be read as text; names it."""
     try:
         return path.read_text(encoding='utf-8-sig')
     except (OSError, UnicodeDecodeError) as error:
@@ -267,11 +254,7 @@ def read_text(path: Path) -> str:
 
 
 def parse_number(text: str, what: str) -> float:
-    """Number of a cell.
-
-    Raises:
-        ValueError: It is not a number; begins with ``what``.
-    """
+    """Number of a cell. ValueError: it is not a number; begins with ``what``."""
     try:
         return float(text)
     except ValueError:

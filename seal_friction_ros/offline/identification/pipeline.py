@@ -24,12 +24,7 @@ from seal_friction_ros.core.friction.seal_file import parse_part, parse_seal
 from seal_friction_ros.core.identification import diagnostics, fitting, run_in, runs, seal_kinds, validation
 from seal_friction_ros.core.identification.breakaway import BreakawayFit, fit_breakaway
 from seal_friction_ros.core.identification.calibration import calibration
-from seal_friction_ros.core.identification.candidate_laws import (
-    CandidateLaw,
-    SealKind,
-    candidate_laws,
-    normal_forces,
-)
+from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, SealKind, candidate_laws, normal_forces
 from seal_friction_ros.core.identification.force_correction import ForceCorrection, force_correction
 from seal_friction_ros.core.identification.friction_model import Told
 from seal_friction_ros.core.identification.prepare_readings import with_predictable_groups
@@ -98,17 +93,15 @@ def identify(
 ) -> Identification:
     """Read bags, logs, tables or data sheets, fit every law, select one and assess it.
 
+    ValueError: the folder or the cluster cannot be used, the data are unfit for identification, or no law predicts
+    them; one line with the reason and what to measure instead.
+
     Args:
         paths: The sources, by path or URL.
         options: How.
         name: Of the seal, unless the options name it.
-        workers: Sources, and groups of readings that are left out, at a time, or a cluster; the result does not depend
-            on it.
+        workers: Sources, and groups that are left out, at a time, or a cluster; the result does not depend on it.
         work: Folder that keeps what was found without each group, so that an interrupted run resumes; None keeps none.
-
-    Raises:
-        ValueError: The folder or the cluster cannot be used, the data are unfit for identification, or no law predicts
-            them; one line with the reason and what to measure instead.
     """
     data = gather(paths, options, workers)
     elastic = identify_presliding(data.sources) if options.presliding else None
@@ -139,10 +132,8 @@ def identify(
 def gather(paths: Sequence[Place], options: IdentifyOptions, workers: Workers = 1) -> IdentificationData:
     """Read the sources, correct the force sum, take all readings to one temperature, exclude a pressure that is off.
 
-    Arguments are those of `identify`.
-
-    Raises:
-        ValueError: The data are unfit for identification, or do not tell the kinds of seals apart.
+    Arguments are those of `identify`. ValueError: the data are unfit for identification, or do not tell the kinds of
+    seals apart.
     """
     of_sources, kinds = options.sources, options.kinds
     if kinds:
@@ -164,14 +155,10 @@ def gather(paths: Sequence[Place], options: IdentifyOptions, workers: Workers = 
         )
     readings = _with_normal_force(prepared.readings, ring)
     outlier = None
-    if not readings.are_samples and not kinds and len(readings.levels) >= 4:
-        laws = _power_laws(readings)
-        offsets = fitting.fit(laws[0], readings).offsets
-        floor = diagnostics.repeatability(readings, offsets)
-        outlier = diagnostics.outlying_level(laws, readings, floor if math.isfinite(floor) else 0.0)
-    used = readings
-    if outlier is not None:
-        used = readings.without(readings.level == outlier.level)
+    if not readings.are_samples and not kinds:
+        laws = [law for law in _candidates(readings) if law.law_type is PressurePowerLaw and law.fixed]
+        outlier = diagnostics.outlying_level(laws, readings)
+    used = readings if outlier is None else readings.without(readings.level == outlier.level)
     return IdentificationData(sources, prepared._replace(readings=readings), used, ring, outlier, correction, warmth)
 
 
@@ -196,7 +183,7 @@ def _prepared(sources: Sources, kinds: tuple[SealKind, ...]) -> PreparedReadings
     return prepared._replace(readings=readings)
 
 
-def _correction(prepared: PreparedReadings, has_fitted_load: bool) -> ForceCorrection | seal_kinds.AreaErrors | None:
+def _correction(prepared: PreparedReadings, has_fitted_load: bool) -> ForceCorrection | None:
     if not prepared.readings.kinds:
         return force_correction(prepared)
     variation = variation_of(prepared.readings)
@@ -212,11 +199,6 @@ def _told_apart(data: IdentificationData, selection: LawSelection, largest_error
     found = seal_kinds.told_apart(model, data.used)
     seal_kinds.check_told_apart(found, model, data.used, largest_error)
     return found
-
-
-def _power_laws(readings: FrictionReadings) -> tuple[CandidateLaw, ...]:
-    """The pressure power law with each fixed exponent."""
-    return tuple(law for law in _candidates(readings) if law.law_type is PressurePowerLaw and law.fixed)
 
 
 def _ring(sources: Sources, options: IdentifyOptions) -> Ring | None:
@@ -269,14 +251,13 @@ def select_law(
 ) -> LawSelection:
     """Fit and score every candidate law; select the recommended one, or the one called ``name``; the rest as above.
 
-    Raises:
-        ValueError: No law could be fitted, the selected one predicts nothing, or there is no law of that name.
+    ValueError: no law could be fitted, the selected one predicts nothing, or there is no law of that name.
     """
     with progress('fit and leave out', len(_candidates(data.used, data.ring)) + MOST_EXTENSIONS) as advance:
         scores = _scored(data.used, data.ring, data.sources.has_fitted_load, advance)
     best = recommended(scores, rises=rises_over_pressures(data.used))
-    settled, readings, share = _settled(data, best), data.used, np.ones(data.used.count)
-    is_no_run_in = False
+    readings, share, is_no_run_in = data.used, np.ones(data.used.count), False
+    settled = run_in.settled_readings(readings, fitting.offsets_of(readings, best.fit.friction(readings.at)))
     if settled is not None and len(data.used.levels) >= FEWEST_TO_COMPARE:
         of_settled = _scored(settled.readings, data.ring, data.sources.has_fitted_load)
         best_settled = recommended(of_settled, rises=rises_over_pressures(settled.readings))
@@ -316,11 +297,6 @@ def select_law(
         reference=validation.plain_mean(data.used),
         chosen_anew=anew,
     )
-
-
-def _settled(data: IdentificationData, best: LawScore) -> run_in.SettledReadings | None:
-    """Readings of the settled seal; None if no drift is evident. The ``best`` law tells the offset of the force sum."""
-    return run_in.settled_readings(data.used, fitting.offsets_of(data.used, best.fit.friction(data.used.at)))
 
 
 def _choose_anew(

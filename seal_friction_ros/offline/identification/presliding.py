@@ -24,8 +24,7 @@ class IdentifiedPresliding(NamedTuple):
 def identify_presliding(sources: Sources) -> IdentifiedPresliding:
     """Fit the elasticity to the reversals of all logs, and score it on every second reversal.
 
-    Raises:
-        ValueError: The sources are no logs, or their reversals do not tell the elasticity.
+    ValueError: the sources are no logs, or their reversals do not tell the elasticity.
     """
     logs = [reversal_log(source.log) for source in sources.each if source.log is not None]
     if not logs:

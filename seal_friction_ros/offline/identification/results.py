@@ -21,7 +21,7 @@ from seal_friction_ros.core.identification.force_correction import NOTICED, Forc
 from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
 from seal_friction_ros.core.identification.run_in import Drift, SettledLaw
 from seal_friction_ros.core.identification.runs import BetweenRuns
-from seal_friction_ros.core.identification.seal_kinds import AreaErrors, ToldApart, proposed_conditions
+from seal_friction_ros.core.identification.seal_kinds import ToldApart, proposed_conditions
 from seal_friction_ros.core.identification.selection import ChosenAnew, LawScore, NotScored, is_beaten, scored
 from seal_friction_ros.core.identification.signal_preparation import LEVEL_GAP, LEVEL_GAP_MIN
 from seal_friction_ros.core.identification.temperature import TemperatureFit
@@ -57,8 +57,7 @@ class IdentificationData:
     used: FrictionReadings  # those that the law is fitted to
     ring: Ring | None
     outlier: Outlier | None
-    correction: ForceCorrection | AreaErrors | None
-    """of areas in the force sum, made if it is significant; None if unknown"""
+    correction: ForceCorrection | None  # made if it is significant; None if unknown
     temperature: TemperatureFit | None = None  # all readings are at its reference if it is identified
 
     @property
@@ -174,9 +173,7 @@ def seal_document(
     """Seal file of a kind of seals by the selected law, or by that for the ``settled`` seal, checked as by the node.
 
     The standard deviation is its share of that of all seals together, also at pressures that were not driven.
-
-    Raises:
-        ValueError: The law makes no valid seal.
+    ValueError: the law makes no valid seal.
     """
     seals, law, kind = len(data.sources.chambers), selection.law, data.kinds[number]
     values = rounded_numbers(law.of_one_seal((selection.fit if settled is None else settled.fit).values)[number])
@@ -220,12 +217,15 @@ def seal_document(
 
 
 def _covariance(selection: LawSelection, number: int) -> dict[str, Any]:
-    """Covariance of the parameters of one seal of a kind, by fits without each group."""
-    law = selection.law
+    """Covariance of the parameters of one seal of a kind, by fits without each group; of a term that is none: prior."""
+    law, model = selection.law, selection.fit.model
     terms = list(dict.fromkeys(p.name.rpartition('.')[2] for p in law.parameters))  # without the name of a kind
     of_one = [law.of_one_seal(each)[number] for each in selection.validation.values]
     covariance = jackknife_covariance(table_of(of_one, terms))
     std = np.sqrt(np.diag(covariance))
+    none = {} if model is None else fitting.std_of_none(law, model, selection.readings.at.pressure.shape[1])
+    of_prior = law.of_one_seal(selection.fit.values | none)[number]
+    std = np.array([of_prior[term] if term in none else found for term, found in zip(terms, std, strict=True)])
     correlation = np.clip(covariance / np.maximum(np.outer(std, std), 1e-300), -1.0, 1.0)
     return {'terms': terms, 'std': std, 'correlation': correlation[np.triu_indices(len(terms), 1)]}
 
@@ -394,7 +394,7 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
             'condition_number': selection.fit.condition_number,
             'correlation': selection.fit.correlation.tolist(),
             'offset_N': [level.offset for level in levels],
-            **_correction_numbers(data.correction if isinstance(data.correction, ForceCorrection) else None),
+            **_correction_numbers(data.correction),
             'between_run_std': quality.between_runs.std,
             'between_runs_measured': quality.between_runs.measured,
             'told_apart_std': quality.told_apart,
@@ -421,7 +421,7 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
 
 def _correction_numbers(correction: ForceCorrection | None) -> dict[str, Any]:
     """The area that the force sum misses; None of each if it was not looked for."""
-    if correction is None:
+    if correction is None or correction.line is None:
         return dict.fromkeys(('area_correction_m2', 'area_correction', 'offset_line'))
     line = correction.line
     return {
@@ -441,10 +441,7 @@ def _run_in_numbers(data: IdentificationData, drifts: Sequence[Drift]) -> list[d
         {
             'source': data.sources.files[drift.source].name,
             'pressure_Pa': data.prepared.readings.level_pressures[drift.level],
-            'change': drift.change,
-            'is_evident': drift.is_evident,
-            'settled_share': drift.settled_share,
-            'settled_std': drift.settled_std,
+            **dict(zip(Drift._fields[2:], drift[2:], strict=True)),  # from the change on
         }
         for drift in drifts
     ]

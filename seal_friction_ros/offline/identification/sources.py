@@ -19,7 +19,6 @@ from seal_friction_ros.core.identification import admission, load_over_position
 from seal_friction_ros.core.identification.force_correction import ForceCorrection
 from seal_friction_ros.core.identification.prepare_readings import prepare_logs, prepare_manual_readings
 from seal_friction_ros.core.identification.readings import ManualReadings, PreparedReadings, RecordedLog, check_clipping
-from seal_friction_ros.core.identification.seal_kinds import AreaErrors
 from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding
 from seal_friction_ros.files import config_path, share_directory
 from seal_friction_ros.offline.bags.actuator_bag import open_actuator
@@ -93,11 +92,7 @@ class Sources:
         return any(source.load is not None for source in self.each)
 
     def prepare(self) -> PreparedReadings:
-        """Readings of all sources.
-
-        Raises:
-            ValueError: They are unfit for identification.
-        """
+        """Readings of all sources. ValueError: they are unfit for identification."""
         logs = [source.log for source in self.each if source.log is not None]
         if logs:
             return prepare_logs(logs, self.chambers)
@@ -110,7 +105,7 @@ class Sources:
         """Area by which the rig file turns the pressure into force [m^2]; None if the sources have no rig file."""
         return next((source.pressure_area for source in self.each if source.pressure_area is not None), None)
 
-    def corrected(self, correction: ForceCorrection | AreaErrors) -> 'Sources':
+    def corrected(self, correction: ForceCorrection) -> 'Sources':
         """The sources with areas of the force sum corrected in every log."""
         each = tuple(
             s if s.log is None else s._replace(log=s.log._replace(signals=correction.corrected(s.log.signals)))
@@ -120,16 +115,10 @@ class Sources:
 
 
 def read_sources(paths: Sequence[Place], options: SourceOptions, workers: Workers = 1) -> Sources:
-    """Read every source: bags and logs, or tables and data sheets.
+    """Read every source, by path or URL, as many ``workers`` at a time: bags and logs, or tables and data sheets.
 
-    Args:
-        paths: The sources, by path or URL.
-        options: How.
-        workers: Sources at a time, or a cluster, whose workers read them.
-
-    Raises:
-        ValueError: A source cannot be read, is of no known kind, or does not fit the others; one line that names it. Or
-            the cluster cannot be used.
+    ValueError: a source cannot be read, is of no known kind, or does not fit the others; one line that names it. Or the
+    cluster cannot be used.
     """
     if not paths:
         raise ValueError('no source: give a bag, a log or a table')
@@ -199,10 +188,8 @@ def _read(path: Path, options: SourceOptions) -> Source:
 def without_load_of(source: Source, chambers: Sequence[str], options: SourceOptions) -> Source:
     """The source with load and inertia taken out of its force sum, if that holds a load which follows position.
 
-    With known inertia, samples at higher accelerations are used too, unless the options limit them.
-
-    Raises:
-        ValueError: The load cannot be told from friction; names the log.
+    With known inertia, samples at higher accelerations are used too, unless the options limit them. ValueError: the
+    load cannot be told from friction; names the log.
     """
     if source.log is None or source.load_position is None:
         return source
@@ -300,7 +287,7 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
     missing = [name for name in ('pressure', 'force') if not getattr(topics, name)]
     if missing:
         raise ValueError(f'{path}: no {" and no ".join(missing)} messages: they are needed to identify friction')
-    stamp, received, columns, configuration = read_velocity_rows(bag)
+    stamp, received, columns, configuration, unread = read_velocity_rows(bag)
     chambers, document, holds_load, has_placeholder = None, None, False, False
     if configuration is not None:
         holds_load = configuration.parameters().estimator.force_sum_correction.contains_load
@@ -309,10 +296,13 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
     order = admission.in_order(stamp, received)
     columns[~(np.abs(columns) < 1e15)] = np.nan  # [SI] no measurement is as large
     columns = columns[:, order.rows]
+    early = int(np.argmax(np.isfinite(columns[1:4]).all(axis=0)))  # rows before the first pressures and force sum
+    columns, seconds = columns[:, early:], order.seconds[early:]
     temperature = _from_the_first(columns[5] + ZEROS['degC']) if topics.temperature else None
     position = columns[4] if topics.position else None
-    dropped = {admission.SAME_STAMP: order.same_stamp} if order.same_stamp else {}
-    signals, sliding = Signals(order.seconds, *columns[:4]), _sliding(Sliding(), options)
+    dropped = {**unread, admission.SAME_STAMP: order.same_stamp, admission.NOT_STARTED: early}
+    dropped = {reason: count for reason, count in dropped.items() if count}
+    signals, sliding = Signals(seconds, *columns[:4]), _sliding(Sliding(), options)
     log, texts = _admitted(RecordedLog(bag.name, signals, sliding, temperature, position, dropped))
     return Source(
         _data_file(path),
@@ -367,9 +357,7 @@ def read_table(path: Path) -> tuple[ManualReadings, ManualReadings]:
     Columns, by the names in its first row: ``pressure_<unit>`` (psig, psi, bar, kPa, MPa, Pa) and ``friction_<unit>``
     (lbf, N, kN), of all seals; optional ``direction`` (extend or retract), ``kind`` (dynamic or static), ``test``,
     ``velocity_<unit>`` (m_per_s, mm_per_s, in_per_s) and ``dwell_s``, the time at rest before a static reading.
-
-    Raises:
-        ValueError: The table cannot be read or a cell is invalid; one line that names file, row and column.
+    ValueError: the table cannot be read or a cell is invalid; one line that names file, row and column.
     """
     rows = table_rows(path)
     if not rows:
@@ -392,8 +380,7 @@ def read_table(path: Path) -> tuple[ManualReadings, ManualReadings]:
 def table_rows(path: Path) -> list[dict[str, str]]:
     """Rows of a table of comma-separated values as mappings from the names in its first row, in lower case.
 
-    Raises:
-        ValueError: It cannot be read, or a row and the first row differ in their number of cells.
+    ValueError: it cannot be read, or a row and the first row differ in their number of cells.
     """
     lines = [line for line in read_text(path).splitlines(keepends=True) if line.strip() and not line.startswith('#')]
     rows = []
@@ -408,9 +395,7 @@ def column_in_si(path: Path, rows: Sequence[Mapping[str, str]], quantity: str, u
     """A column of the table ``path`` in SI units; its name is that of the quantity, followed by a unit.
 
     ``rows`` are those of `table_rows`, at least one; ``units`` maps the unit in the name to the unit in `UNITS`.
-
-    Raises:
-        ValueError: There is no such column, or several, or a cell is not a number.
+    ValueError: there is no such column, or several, or a cell is not a number.
     """
     found = [name for name in rows[0] if name.startswith(quantity)]
     unit = found[0].removeprefix(quantity).strip('_ ()[]') if found else ''

@@ -51,20 +51,14 @@ def warnings_of(
             f'measured at {low:.4g} to {high:.4g} bar only: there the law holds; how friction rises beyond comes from '
             'a prior, not from these data: measure at three pressures to know it'
         )
-    if isinstance(data.correction, ForceCorrection) and data.correction.is_significant:
+    if data.correction is not None and data.correction.is_significant:
         yield _correction_text(data.correction, data.sources.pressure_area)
-    elif data.correction is not None and data.correction.is_significant:
-        change = ' and '.join(
-            f'{1e6 * x:+.3g} mm2 for chamber {c}' for c, x in zip('ab', data.correction.areas, strict=True)
-        )
-        yield f'the areas in the force sum are off: {change}; the laws are fitted with the corrected areas'
     if data.outlier is not None:
         yield _outlier_text(data.outlier, levels)
     yield from _collinearity_texts(data, selection)
     gain = _pressure_gain(selection)
     if gain is not None and not gain[1]:
         yield f'no gain is claimed for pressure: {gain[0]}: the difference is within the noise'
-    yield from _parameter_texts(selection)
     yield from _scatter_texts(selection, quality, levels)
     if quality.breakaway is not None and quality.breakaway.dwell is not None:
         yield _dwell_text(quality.breakaway)
@@ -95,6 +89,11 @@ def _change_texts(quality: LawQuality) -> Iterator[str]:
 
 
 def _correction_text(correction: ForceCorrection, area: float | None) -> str:
+    if not correction.chamber:
+        change = ' and '.join(
+            f'{1e6 * x:+.3g} mm2 for chamber {c}' for c, x in zip('ab', correction.areas, strict=True)
+        )
+        return f'the areas in the force sum are off: {change}; the laws are fitted with the corrected areas'
     change = f'{1e6 * correction.area:+.3g} mm2 (standard error {1e6 * correction.standard_error:.2g} mm2)'
     text = (
         f'the area of chamber {correction.chamber} in the force sum is off: its offset follows the pressure, by '
@@ -183,13 +182,6 @@ def _pressure_gain(selection: LawSelection) -> tuple[str, bool] | None:
     return f'{text} ({other_name})', selection.best.law.depends_on_pressure
 
 
-def _parameter_texts(selection: LawSelection) -> Iterator[str]:
-    for parameter in selection.law.parameters:
-        value = selection.fit.values[parameter.name]
-        if value == 0.0 and parameter.lower == 0.0:
-            yield f'{parameter.name} is 0: these data show no such effect'
-
-
 def one_run_text(between: BetweenRuns) -> str:
     """That data of one run do not show how runs differ, and what stands for it."""
     return (
@@ -200,6 +192,9 @@ def one_run_text(between: BetweenRuns) -> str:
 
 
 def _scatter_texts(selection: LawSelection, quality: LawQuality, levels: Sequence[PressureLevel]) -> Iterator[str]:
+    for parameter in selection.law.parameters:
+        if selection.fit.values[parameter.name] == parameter.lower == 0.0:
+            yield f'{parameter.name} is 0: these data show no such effect'
     between = quality.between_runs
     if between.std > 0.0 and not between.freedom and not quality.is_stated:
         yield one_run_text(between)

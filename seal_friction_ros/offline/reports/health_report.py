@@ -9,6 +9,7 @@ import numpy as np
 
 from seal_friction_ros.core.estimation.findings import LOOK, Finding, Limits, Verdict, verdict_of
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
+from seal_friction_ros.core.identification.admission import Account
 from seal_friction_ros.offline.replay.bag_health import BagHealth
 from seal_friction_ros.offline.replay.health_indicators import Day, Value, alarms_of, changes_of, day_of, trend
 from seal_friction_ros.offline.reports import figure_style as style
@@ -57,11 +58,13 @@ def write_health_report(
     if out is None:
         return ReportSummary(Path(), (), numbers)
     rows = [
-        [day.name, one.level, one.why, day.reversals, *(_text(getattr(day, name)) for name in INDICATORS)]
+        [day.name, one.level, one.why, samples, day.reversals, *(_text(getattr(day, name)) for name in INDICATORS)]
         for day, one in zip(days, seen, strict=True)
+        for samples in [Account(day.name, one.used, one.left_out).text]
     ]
-    heads = ('bag', 'verdict', 'why', 'reversals', *(f'{text} [{unit}]' for text, unit in INDICATORS.values()))
-    table = Table(heads, rows, (0, 1, 2))
+    units = (f'{text} [{unit}]' for text, unit in INDICATORS.values())
+    heads = ('bag', 'verdict', 'why', 'samples', 'reversals', *units)
+    table = Table(heads, rows, (0, 1, 2, 3))
     trend_rows = [[text, _text(trends[name]), f'{unit}/h'] for name, (text, unit) in INDICATORS.items()]
     figures = write_page(
         out,

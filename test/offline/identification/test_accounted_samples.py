@@ -120,10 +120,12 @@ def count_of(bag: Path, *, topic: str) -> int:
 def test_every_message_of_a_damaged_bag_is_used_or_left_out_with_a_reason(seed, axis, tmp_path, capsys):
     made, bag, out = damaged_bag(axis, tmp_path, seed), str(tmp_path / 'bag'), str(tmp_path / 'out')
     (tmp_path / 'robot.yaml').write_text(MAPPING)
+    mapped = ['--mapping', str(tmp_path / 'robot.yaml')]
     used = {}
     for name, words in {
-        'import': ['import', 'bag', str(made), '--mapping', str(tmp_path / 'robot.yaml'), '--out', bag],
+        'import': ['import', 'bag', str(made), *mapped, '--out', bag],
         'identify': ['identify', bag, '--largest-acceleration', '100', '--out', f'{out}.yaml'],
+        'mapped': ['identify', str(made), *mapped, '--largest-acceleration', '100', '--out', f'{out}_mapped.yaml'],
         'tune': ['tune', '--bag', bag, '--out', f'{out}_feedforward.yaml'],
         'health': ['health', bag],
     }.items():
@@ -131,10 +133,12 @@ def test_every_message_of_a_damaged_bag_is_used_or_left_out_with_a_reason(seed, 
         figures = json.loads(capsys.readouterr().out)
         figures = {'import': lambda f: f['axis'], 'health': lambda f: f['bags'][0]}.get(name, lambda f: f)(figures)
         counts = [figures[key] for key in ('samples_used', 'samples_total')]
-        used[name], total = (one['bag'] if isinstance(one, dict) else one for one in counts)
-        topic = '/joint_states' if name == 'import' else '/rod_velocity'
-        assert total == count_of(made if name == 'import' else Path(bag), topic=topic)
+        used[name], total = (next(iter(one.values())) if isinstance(one, dict) else one for one in counts)
+        is_foreign = name in ('import', 'mapped')
+        topic = '/joint_states' if is_foreign else '/rod_velocity'
+        assert total == count_of(made if is_foreign else Path(bag), topic=topic)
         assert used[name] + sum(figures['samples_left_out'].values()) == total
         assert min(figures['samples_left_out'].values()) > 0
+        assert ('malformed' in figures['samples_left_out']) == is_foreign
     assert used['import'] == count_of(Path(bag), topic='/rod_velocity')
     assert 0 < used['identify'] < used['import']

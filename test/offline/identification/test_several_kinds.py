@@ -76,6 +76,10 @@ def test_each_kind_has_a_seal_file_with_its_mounting(told_apart):
         'piston': ['difference'],
     }
     assert [file['name'] for file in files.values()] == ['seal_rod', 'seal_piston']
+    for file in files.values():
+        known = dict(zip(file['covariance']['terms'], file['covariance']['std'], strict=True))
+        assert file['velocity_terms']['asymmetry'] == 0.0
+        assert known['asymmetry'] == 0.08  # less probable than none: its prior
     assert not run.out.exists()
     assert run.has_warning('friction at no pressure', 'cannot be divided')
 

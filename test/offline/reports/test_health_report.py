@@ -41,3 +41,10 @@ def test_the_page_begins_with_the_alarm_or_says_that_there_is_none(tmp_path: Pat
 def test_a_bag_without_a_reversal_still_makes_a_page(tmp_path: Path):
     report = write_health_report(['mon'], [day(0.0, 1.0, 0)], tmp_path / 'page.html', Limits())
     assert checked_page(report.page).texts['p.said'] == ['Look: No steady sliding.']
+
+
+def test_the_page_tells_why_samples_were_left_out(tmp_path: Path):
+    one = day(1.7e9, 1.0, 40)._replace(used=60, left_out={'at rest': 30, 'not finite': 10})
+    page = checked_page(write_health_report(['mon'], [one], tmp_path / 'page.html', Limits()).page)
+    said = '60 of 100 samples used (60 %); not used: at rest 30 %, not finite 10 %'
+    assert said in page.prose
