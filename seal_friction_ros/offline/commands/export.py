@@ -1,0 +1,46 @@
+"""``seal_friction export``: the estimator inside another program."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from seal_friction_ros.offline.commands import command_line as cli
+from seal_friction_ros.offline.work.targets import C_LIBRARY
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    description = 'write the estimator as a C library for a control loop'
+    kinds = cli.add_group(commands, 'export', 'KIND', description, 'export c rod@a piston@difference --out friction_c')
+    library = cli.add_command(
+        kinds, 'c', run_c, 'write C sources, libraries, a Makefile and examples into a folder',
+        'export c ms28775_114@a ms28775_114@b --out friction_c',
+        'export c --params config/friction_estimator.yaml --bag bags/pull_test --out friction_c',
+    )  # fmt: skip
+    _add_configuration(library)
+    text = 'of the library, and before each name in it'
+    library.add_argument('--name', default='seal_friction', metavar='NAME', help=text)
+    library.add_argument('--bag', type=Path, metavar='BAG', help='its inputs become the samples of the examples')
+    cli.add_target(library, '--out', C_LIBRARY, required=True, metavar='FOLDER', help='folder to write')
+
+
+def _add_configuration(parser: argparse.ArgumentParser) -> None:
+    text = 'seal file of every seal: NAME, or NAME@CHAMBER for each'
+    parser.add_argument('seals', nargs='*', metavar='SEAL', help=text)
+    parser.add_argument('--params', type=Path, metavar='FILE', help='ROS parameter file of the estimator')
+
+
+def _configuration(arguments: argparse.Namespace) -> Any:
+    from seal_friction_ros.files import default_configuration
+    from seal_friction_ros.offline.replay.replay import chosen_configuration
+
+    return chosen_configuration(arguments.params, arguments.seals) or default_configuration()
+
+
+def run_c(arguments: argparse.Namespace) -> int:
+    """Write the library."""
+    from seal_friction_ros.offline.export.c_library import export_c, samples_of
+
+    samples = samples_of(arguments.bag) if arguments.bag else ''
+    made = export_c(_configuration(arguments), arguments.out, arguments.name, samples)
+    return cli.print_result(arguments, made, made.summary())
