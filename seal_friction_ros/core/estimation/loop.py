@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters
 from seal_friction_ros.core.estimation.pipeline import ZERO_CELSIUS, receive
 from seal_friction_ros.core.friction.actuator import at_temperature, breakaway_in, friction_of_seals
-from seal_friction_ros.core.friction.states import StateFriction, sign, state_friction
+from seal_friction_ros.core.friction.states import UNKNOWN, StateFriction, sign, state_friction
 from seal_friction_ros.core.messages.records import Force, Pressure, ServoReference, Temperature, Velocity
 
 
@@ -47,15 +47,18 @@ class RodLoad(NamedTuple):
     velocity: float  # [m/s] positive on extension
     pressure_a: float  # [Pa, gauge]
     pressure_b: float  # [Pa, gauge]
-    force_sum: float  # [N] every axial force on the moving mass except seal friction; counts at rest only
+    force_sum: float = 0.0  # [N] every axial force on the moving mass except seal friction; counts at rest only
     temperature: float = math.nan  # [degC] of the seals; NaN: that of the seal file
 
 
 def friction_on_rod(parameters: EstimatorParameters, load: RodLoad) -> StateFriction:
     """Friction of the seals on a rod by the seal files, without adaptation and elasticity: `states.state_friction`.
 
-    The rod rests at a speed of ``stick_velocity`` and below; a plant that never rests may set that to 0.
+    The rod rests at a speed of ``stick_velocity`` and below; a plant that never rests may set that to 0. The state is
+    UNKNOWN and the force 0 N where a number is not finite.
     """
+    if not math.isfinite(load.velocity + load.pressure_a + load.pressure_b + load.force_sum):
+        return StateFriction(UNKNOWN, 0, 0.0)
     at_rest = abs(load.velocity) <= parameters.settings.stick_velocity
     velocity = 0.0 if at_rest else load.velocity
     friction = friction_of_seals(parameters.seal_numbers, load.pressure_a, load.pressure_b, velocity)

@@ -36,6 +36,7 @@ COMMANDS = {
     ('ehl', 'study'): ['inner_seal'],
     ('ehl', 'map'): ['inner_seal'],
     ('export', 'c'): ['delft_o_ring'],
+    ('export', 'fmu'): ['delft_o_ring'],
 }
 """command -> its arguments besides the targets; a command that is missing here writes nothing"""
 
