@@ -1,6 +1,7 @@
 """Exported FMUs simulate what Python computes, and the exported C builds with clang, too."""
 
 import math
+import re
 import shutil
 import subprocess
 import sys
@@ -16,11 +17,13 @@ from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 from harness.compensation import compensating
+from paths import ROOT
 
 from seal_friction_ros.core.estimation.loop import LoopSample, RodLoad, friction_on_rod, receive_sample
 from seal_friction_ros.core.estimation.pipeline import init
 from seal_friction_ros.core.messages.records import FeedForward, FrictionEstimate
 from seal_friction_ros.offline.commands.main import main
+from seal_friction_ros.offline.export.c_library import sources
 from seal_friction_ros.offline.export.fmu import export_fmu
 
 CONFIGURATION = compensating(presliding=True)
@@ -128,3 +131,13 @@ def test_the_sources_in_the_fmu_build_with_clang_without_a_warning(exported):
 def test_the_command_writes_an_fmu(tmp_path: Path, capsys):
     assert main(['export', 'fmu', 'delft_o_ring', '--model', 'friction', '--out', str(tmp_path / 'seal.fmu')]) == 0
     assert 'friction, FMI 3.0, binary and sources' in capsys.readouterr().out
+
+
+def test_the_controller_of_the_docs_compiles_against_stand_in_headers(tmp_path: Path):
+    page = (ROOT / 'docs' / 'controllers.md').read_text()
+    (source,) = (text for text in re.findall(r'```cpp\n(.*?)```', page, re.DOTALL) if 'seal_friction.h' in text)
+    (tmp_path / 'controller.cpp').write_text(source)
+    (tmp_path / 'seal_friction.h').write_text(sources(PARAMETERS, '{}', 'seal_friction')['seal_friction.h'])
+    headers = ROOT / 'test' / 'harness' / 'ros2_control'
+    check = ['c++', '-std=c++17', '-Wall', '-Wextra', '-Werror', '-fsyntax-only', '-I', str(headers), 'controller.cpp']
+    subprocess.run(check, cwd=tmp_path, check=True)
