@@ -46,9 +46,9 @@ def blocks(messages: int) -> Iterator[Any]:
         yield pieces, times, sent
 
 
-def compared(parameters: PipelineParameters, messages: int, folder: Path) -> dict[str, Any]:
+def compared(name: str, parameters: PipelineParameters, messages: int, folder: Path) -> dict[str, Any]:
     """Messages, answers, and how many of these differ from compiled replay."""
-    library, state, done, answers, differing = CEstimator(parameters, folder), init(parameters), 0, 0, 0
+    library, state, done, answers, differing = CEstimator(parameters, folder, name), init(parameters), 0, 0, 0
     for pieces, times, sent in blocks(messages):
         state, found = receive_all(parameters, state, in_memory(pieces, times, sent))
         places = zip(*(column.tolist() for column in found[1:]), strict=True)
@@ -81,7 +81,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         cases = {'default': {}, 'others': {'presliding': True}}
-        found = {case: compared(with_seals(ACTUATORS[case], **changes), arguments.messages, folder)
+        found = {case: compared(case, with_seals(ACTUATORS[case], **changes), arguments.messages, folder)
                  for case, changes in cases.items()}  # fmt: skip
         tell(found, as_json=arguments.json, title='C against compiled replay')
         tell({case: built(case, options, folder) for case, options in BUILDS.items()}, as_json=arguments.json)

@@ -1,8 +1,9 @@
 """C from the functions of the estimator: the subset of Python that the compiler of replay takes, too.
 
 `Translation.function` translates a function for given arguments, and every function that it calls. What is known by
-then (the parameters: settings, seals, laws) is no argument in C: its numbers are constants, the branches that it rules
-out are left out, the laws are called by their functions. What is not known is a number or a record of numbers.
+then (the parameters: settings, seals, laws) is no argument in C: Python evaluates each expression of known values, the
+branches that they rule out are left out, the laws are called by their functions. What is not known is a number or a
+record of numbers.
 
 The C computes what Python computes, operation by operation: IEEE double precision in the same order; whole numbers of
 64 bits, which wrap around as in compiled replay.
@@ -11,17 +12,16 @@ The C computes what Python computes, operation by operation: IEEE double precisi
 import ast
 import inspect
 import math
-import operator
 import re
 import textwrap
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any, cast, get_type_hints
 
 from seal_friction_ros.core.estimation.pipeline import send
-from seal_friction_ros.core.foundation.compiled import evaluate, replace, unrolled
+from seal_friction_ros.core.foundation.compiled import evaluate, replace
 from seal_friction_ros.core.messages.records import field_names
 from seal_friction_ros.offline.export.c_types import (
     SCALARS,
@@ -52,15 +52,14 @@ PRELUDE = {
     'larger_integer': 'int64_t larger_integer(int64_t a, int64_t b) { return b > a ? b : a; }',
     # volatile: a compiler turns a power of 2 that it knows into a product, which rounds differently
     'power': 'double power(double a, double b) { volatile double exponent = b; return pow(a, exponent); }',
-    'last_place': (
-        'int64_t last_place(const double *knots, int64_t n, double x) {\n'
-        '    int64_t low = 0, high = n;\n'
-        '    while (low < high) {\n'
-        '        int64_t middle = (low + high) / 2;\n'
-        '        if (x < knots[middle]) high = middle; else low = middle + 1;\n'
-        '    }\n'
-        '    return low;\n}'
-    ),
+    'last_place': """int64_t last_place(const double *knots, int64_t n, double x) {
+    int64_t low = 0, high = n;
+    while (low < high) {
+        int64_t middle = (low + high) / 2;
+        if (x < knots[middle]) high = middle; else low = middle + 1;
+    }
+    return low;
+}""",
 }
 """Functions that the translated ones call: whole numbers wrap around; of two numbers Python chooses like this."""
 
@@ -68,22 +67,12 @@ _WHOLE = {ast.Add: 'add', ast.Sub: 'subtract', ast.Mult: 'multiply'}
 _BITS = {ast.BitAnd: '&', ast.BitOr: '|', ast.BitXor: '^'}
 _REAL = {ast.Add: '+', ast.Sub: '-', ast.Mult: '*', ast.Div: '/'}
 _COMPARED = {ast.Lt: '<', ast.LtE: '<=', ast.Gt: '>', ast.GtE: '>=', ast.Eq: '==', ast.NotEq: '!='}
-_OPERATORS: dict[type, Callable[..., Any]] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
-    ast.BitAnd: operator.and_, ast.BitOr: operator.or_, ast.BitXor: operator.xor, ast.Lt: operator.lt,
-    ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge, ast.Eq: operator.eq, ast.NotEq: operator.ne,
-    ast.Is: operator.is_, ast.IsNot: operator.is_not, ast.USub: operator.neg, ast.Invert: operator.invert,
-    ast.Not: operator.not_,
-}  # fmt: skip
 _ALIKE = (
     'acos', 'asin', 'atan', 'atan2', 'copysign', 'cos', 'cosh', 'exp', 'expm1', 'fabs', 'log', 'log10', 'log1p', 'log2',
     'sin', 'sinh', 'sqrt', 'tan', 'tanh',
 )  # fmt: skip
 _OF_MATH = {math.pow: 'power', **{getattr(math, name): name for name in _ALIKE}}
 _TESTS = {math.isnan: 'isnan', math.isinf: 'isinf', math.isfinite: 'isfinite'}
-_BUILTINS = {
-    each.__name__: each for each in (abs, bool, float, int, len, max, min, range, type)
-}  # what else a source may call, it imports
 _RESERVED = {
     'auto', 'break', 'case', 'char', 'const', 'default', 'do', 'double', 'enum', 'extern', 'float', 'goto', 'inline',
     'int', 'long', 'register', 'restrict', 'short', 'signed', 'sizeof', 'static', 'struct', 'switch', 'typedef',
@@ -96,7 +85,7 @@ class Translation:
 
     def __init__(self, types: Types) -> None:
         self.types = types
-        self.functions: list[str] = []
+        self._functions: dict[str, str] = {}  # name in C -> text
         self._known: dict[Any, tuple[str, Any]] = {}  # function and its arguments -> name in C, kind of its value
         self._constants: dict[str, str] = {}  # declaration without name -> name
         self._kept: list[Any] = []  # static arguments: their addresses are keys
@@ -104,7 +93,7 @@ class Translation:
     @property
     def text(self) -> str:
         """Everything, in the order that C wants."""
-        functions = '\n'.join(self.functions)
+        functions = '\n'.join(self._functions.values())
         constants = [f'static const {text.replace("@", name)};' for text, name in self._constants.items()]
         helpers = [f'static inline {text}' for name, text in PRELUDE.items() if re.search(rf'\b{name}\(', functions)]
         return '\n'.join([*helpers, '', *constants, '', functions])
@@ -121,12 +110,13 @@ class Translation:
         key = (function, *(id(a.value) if isinstance(a, Static) else a.kind for a in arguments))
         if key not in self._known:
             self._kept += [a.value for a in arguments if isinstance(a, Static)]
-            stem = f'{function.__module__.rpartition(".")[2]}_{function.__name__.strip("_")}'
-            alike = sum(name.rpartition('_v')[0] == stem or name == stem for name, _ in self._known.values())
-            name = f'{stem}_v{alike + 1}' if alike else stem
             body = _Body(self, function, arguments)
-            text = body.text(name)
-            self.functions.append(text)
+            name = stem = f'{function.__module__.rpartition(".")[2]}_{function.__name__.strip("_")}'
+            lines, alike = body.lines(), 1
+            while name in self._functions:
+                alike += 1
+                name = f'{stem}_v{alike}'
+            self._functions[name] = '\n'.join([f'/* {first_line(function)} */', body.head(name), '{', *lines, '}', ''])
             self._known[key] = name, body.returned
         return self._known[key]
 
@@ -137,42 +127,52 @@ class _Body:
     def __init__(self, translation: Translation, function: Callable[..., Any], arguments: Sequence[Value]) -> None:
         self._all, self._function, self._tree = translation, function, _tree_of(function)
         self._given = dict(zip(inspect.signature(function).parameters, arguments, strict=True))
-        self._stores = Counter([*self._given, *_stored(self._tree)])
-        for node in ast.walk(self._tree):
-            if isinstance(node, ast.Assign) and isinstance(node.value, ast.IfExp):
-                self._stores.update(_stored(node))  # in both branches
+        stored = [n.id for n in ast.walk(self._tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+        self._stores = Counter([*self._given, *stored])
         self._kinds = {name: each.kind for name, each in self._given.items() if isinstance(each, Runtime)}
+        self._arguments = tuple(self._kinds)
         self._unread: set[str] = set()  # known after the first pass
         self.returned: Any = None
 
-    def text(self, name: str) -> str:
-        """The function in C. Passes repeat until the kind of each variable is known, and which ones are read."""
+    def head(self, name: str) -> str:
+        """Beginning of the function in C."""
+        given = ', '.join(map(self._declared, self._arguments))
+        return f'static {self._all.types.name(self.returned)} {name}({given or "void"})'
+
+    def lines(self) -> list[str]:
+        """Its lines. Passes repeat until the kind of each variable is known, and which ones are read."""
         lines, before = self._passed(), None
         while before != (self._kinds, self.returned, self._unread):
             before = dict(self._kinds), self.returned, self._unread
             self._unread = {each for each in self._stores if _c_name(each) not in _names_read(lines)}
             lines = self._passed()
-        runtime = [n for n, each in self._given.items() if isinstance(each, Runtime)]
-        parameters = ', '.join(f'{self._declared(n)}' for n in runtime) or 'void'
-        unused = [f'    (void){_c_name(n)};' for n in runtime if n in self._unread]
-        head = f'static {self._all.types.name(self.returned)} {name}({parameters})'
-        return '\n'.join([f'/* {first_line(self._function)} */', head, '{', *unused, *lines, '}', ''])
+        top = [self._unused(name) for name in self._arguments]
+        for name in [each for each in self._kinds if each not in self._arguments]:
+            at = next(i for i, line in enumerate(lines) if _c_name(name) in _NAME.findall(line))
+            value = lines[at].removeprefix(f'    {_c_name(name)} = ')
+            if value == lines[at]:  # set within a block
+                value, at = f'{_zero(self._kinds[name])};', 0
+                lines.insert(at, '')
+            lines[at] = f'    {self._declared(name)} = {value}{self._unused(name)}'
+        return [*filter(None, top), *lines]
+
+    def _unused(self, name: str) -> str:
+        return f' (void){_c_name(name)};' if name in self._unread else ''
 
     def _passed(self) -> list[str]:
-        self._lines, self._depth, self._lazy, self._temporaries = list[str](), 1, 0, 0
+        self._lines, self._depth, self._temporaries = list[str](), 1, 0
         self._static = {name: each.value for name, each in self._given.items() if isinstance(each, Static)}
-        self._local = {name for name, each in self._given.items() if isinstance(each, Runtime)}
-        self._hoisted: list[str] = []
         for name in [n for n in self._static if self._stores[n] > 1 and kind_of(self._static[n])]:
-            self._assign_name(name, Static(self._static.pop(name)))
+            self._set_name(name, Static(self._static[name]))
         self._block(self._tree.body)
-        return [f'    {self._declared(n)} = {"0" if self._kinds[n] in SCALARS else "{0}"};' for n in self._hoisted] + (
-            self._lines
-        )
+        return self._lines
 
     def _declared(self, name: str) -> str:
         kind = self._kinds[name]
         return f'{self._all.types.name(kind)} {"*" if is_mutable(kind) else ""}{_c_name(name)}'
+
+    def _refuse(self, node: ast.AST) -> Any:
+        raise UntranslatableError(f'no C for {type(node).__name__}')
 
     # -- statements ---------------------------------------------------------------------------------------------------
 
@@ -186,61 +186,36 @@ class _Body:
                 if getattr(self, f'_do_{type(statement).__name__.lower()}', self._refuse)(statement):
                     return True
             except UntranslatableError as error:
-                if 'line' in str(error):
-                    raise
-                where = f'{self._function.__module__}.{self._function.__name__}, line {statement.lineno} of it'
-                raise UntranslatableError(f'{where}: {error}: {ast.unparse(statement)}') from None
+                at = f'{self._function.__module__}.{self._function.__name__}: {ast.unparse(statement).splitlines()[0]}'
+                raise error if ' in ' in str(error) else UntranslatableError(f'{error} in {at}') from None
         return False
 
-    def _refuse(self, node: ast.AST) -> bool:
-        raise UntranslatableError(f'no C for {type(node).__name__}')
-
     def _do_expr(self, node: ast.Expr) -> None:
-        if not isinstance(node.value, ast.Constant):
-            called = self._value(node.value)
-            if isinstance(called, Runtime) and called.code:
-                self._emit(f'{called.code};')
-
-    def _do_pass(self, _: ast.Pass) -> None:
-        """Nothing."""
-
-    _do_delete = _do_pass
+        called = self._value(node.value)
+        if isinstance(called, Runtime):
+            self._emit(f'{called.code};')
 
     def _do_return(self, node: ast.Return) -> bool:
-        if isinstance(node.value, ast.IfExp) and isinstance(node.value.body, ast.Tuple):
-            return self._branches(node.value.test, [ast.Return(node.value.body)], [ast.Return(node.value.orelse)])
-        if node.value is None or (isinstance(node.value, ast.Constant) and node.value.value is None):
+        value = Static(None) if node.value is None else self._value(node.value)
+        if value == Static(None):
             self._emit('return;')
             return True
-        value = self._runtime(self._value(node.value))
-        self.returned = value.kind if self.returned is None else unified(self.returned, value.kind)
-        self._emit(f'return {self._as(value, self.returned)};')
+        made = self._runtime(value)
+        self.returned = made.kind if self.returned is None else unified(self.returned, made.kind)
+        self._emit(f'return {_bare(self._as(made, self.returned))};')
         return True
 
-    def _do_assign(self, node: ast.Assign) -> None:
-        self._set_all(node.targets, node.value)
-
-    def _do_annassign(self, node: ast.AnnAssign) -> None:
-        if node.value is not None:
-            self._set_all([node.target], node.value)
-
-    def _do_augassign(self, node: ast.AugAssign) -> None:
-        self._set_all([node.target], ast.BinOp(_as_read(node.target), node.op, node.value))
-
     def _do_if(self, node: ast.If) -> bool:
-        return self._branches(node.test, node.body, node.orelse)
-
-    def _branches(self, test: ast.expr, body: Sequence[ast.stmt], otherwise: Sequence[ast.stmt]) -> bool:
-        condition = self._test(test)
+        condition = self._test(node.test)
         if isinstance(condition, Static):
-            return self._block(body if condition.value else otherwise)
+            return self._block(node.body if condition.value else node.orelse)
         self._emit(f'if ({_bare(condition.code)}) {{')
-        ends = self._indented(body)
-        if otherwise:
+        ends = self._indented(node.body)
+        if node.orelse:
             self._emit('} else {')
-            ends = self._indented(otherwise) and ends
+            ends = self._indented(node.orelse) and ends
         self._emit('}')
-        return ends and bool(otherwise)
+        return ends and bool(node.orelse)
 
     def _indented(self, statements: Sequence[ast.stmt]) -> bool:
         self._depth += 1
@@ -263,17 +238,15 @@ class _Body:
             self._indented(node.body)
         self._emit('} while (0);')
 
-    def _set_all(self, targets: Sequence[ast.expr], source: ast.expr) -> None:
-        first, *others = targets
-        if isinstance(first, ast.Tuple) and isinstance(source, ast.IfExp):
-            assigned = [ast.Assign([first], each) for each in (source.body, source.orelse)]
-            self._branches(source.test, assigned[:1], assigned[1:])
-        elif isinstance(first, ast.Tuple) and isinstance(source, ast.Tuple):
-            self._set_together(first.elts, [self._value(each) for each in source.elts])
-        elif isinstance(first, ast.Tuple):
-            self._set_together(first.elts, self._members(self._value(source)))
+    def _do_assign(self, node: ast.Assign) -> None:
+        first, *others = node.targets
+        if isinstance(first, ast.Tuple):
+            is_tuple = isinstance(node.value, ast.Tuple)
+            elements = cast(ast.Tuple, node.value).elts if is_tuple else []
+            values = [self._value(each) for each in elements] or self._members(self._value(node.value))
+            self._set_together(first.elts, values)
         else:
-            self._set(first, self._value(source))
+            self._set(first, self._value(node.value))
         for other in others:
             self._set(other, self._value(_as_read(first)))
 
@@ -281,9 +254,8 @@ class _Body:
         """Members of a record or tuple, which is computed once."""
         if isinstance(value, Static):
             return [Static(each) for each in value.value]
-        if '(' in value.code:
-            value = self._temporary(value)
-        return [self._attribute(value, name) for name in field_names(value.kind) or fields_of(value.kind)]
+        held = self._temporary(value) if '(' in value.code else value
+        return [self._attribute(held, name) for name in field_names(held.kind) or fields_of(held.kind)]
 
     def _set_together(self, targets: Sequence[ast.expr], values: Sequence[Value]) -> None:
         """All at once: no target changes what another one is set to."""
@@ -296,56 +268,40 @@ class _Body:
             self._set(target, value)
 
     def _is_dropped(self, target: ast.expr, value: Value) -> bool:
-        if not isinstance(target, ast.Name):
-            return False
         is_pure = isinstance(value, Runtime) and '(' not in value.code
-        return target.id == '_' or (is_pure and target.id in self._unread)
+        return isinstance(target, ast.Name) and (target.id == '_' or (is_pure and target.id in self._unread))
 
     def _set(self, target: ast.expr, value: Value) -> None:
         if isinstance(target, ast.Name):
-            self._assign_name(target.id, value)
+            self._set_name(target.id, value)
             return
-        if not isinstance(target, ast.Attribute):
-            raise UntranslatableError('an assignment to what is neither a name nor an attribute')
-        place = self._attribute(self._value(target.value), target.attr)
+        place = self._value(_as_read(target))
         if not isinstance(place, Runtime):
             raise UntranslatableError('an assignment to a parameter')
         self._emit(f'{place.code} = {_bare(self._as(self._runtime(value), place.kind))};')
 
-    def _assign_name(self, name: str, value: Value) -> None:
+    def _set_name(self, name: str, value: Value) -> None:
         if isinstance(value, Static) and (self._stores[name] < 2 or kind_of(value.value) is None):
             self._static[name] = value.value
             return
         self._static.pop(name, None)
         made = self._runtime(value)
-        kind = self._kinds[name] = unified(self._kinds.get(name, made.kind), made.kind)
-        code = _bare(self._as(made, kind))
-        if name in self._local:
-            self._emit(f'{_c_name(name)} = {code};')
-            return
-        self._local.add(name)
-        unread = f' (void){_c_name(name)};' if name in self._unread else ''
-        if self._depth == 1:
-            self._emit(f'{self._declared(name)} = {code};{unread}')
-        else:
-            self._hoisted.append(name)
-            self._emit(f'{_c_name(name)} = {code};{unread}')
-
-    def _temporary_name(self) -> str:
-        self._temporaries += 1
-        return f'held_{self._temporaries}'
+        self._kinds[name] = unified(self._kinds.get(name, made.kind), made.kind)
+        self._emit(f'{_c_name(name)} = {_bare(self._as(made, self._kinds[name]))};')
 
     def _temporary(self, value: Runtime) -> Runtime:
-        if self._lazy:
-            raise UntranslatableError('a record is made where it may not be needed')
-        name = self._temporary_name()
-        star = '*' if is_mutable(value.kind) else ''
+        self._temporaries += 1
+        name, star = f'held_{self._temporaries}', '*' if is_mutable(value.kind) else ''
         self._emit(f'{self._all.types.name(value.kind)} {star}{name} = {_bare(value.code)};')
         return Runtime(name, value.kind)
 
     # -- expressions --------------------------------------------------------------------------------------------------
 
     def _value(self, node: ast.expr) -> Value:
+        """Value of an expression: Python evaluates it, if it has no variable of C."""
+        if all(name in self._static or name not in self._kinds for name in _names_in(node)):
+            known = getattr(self._function, '__globals__', {})
+            return Static(eval(_code_of(node), known, self._static))  # noqa: S307  it is the source of this package
         translate: Any = getattr(self, f'_of_{type(node).__name__.lower()}', self._refuse)
         return cast(Value, translate(node))
 
@@ -373,19 +329,8 @@ class _Body:
         parts = [f'.{n} = {_bare(self._as(self._runtime(v), fields[n]))}' for n, v in zip(fields, members, strict=True)]
         return f'({self._all.types.name(kind)}){{{", ".join(parts)}}}'
 
-    def _of_constant(self, node: ast.Constant) -> Value:
-        return Static(node.value)
-
     def _of_name(self, node: ast.Name) -> Value:
-        name = node.id
-        if name in self._static:
-            return Static(self._static[name])
-        if name in self._local:
-            return Runtime(_c_name(name), self._kinds[name])
-        known = getattr(self._function, '__globals__', {})
-        if name not in known and name not in _BUILTINS:
-            raise UntranslatableError(f'{name} is not known')
-        return Static(known[name] if name in known else _BUILTINS[name])
+        return Runtime(_c_name(node.id), self._kinds[node.id])
 
     def _of_attribute(self, node: ast.Attribute) -> Value:
         return self._attribute(self._value(node.value), node.attr)
@@ -402,38 +347,30 @@ class _Body:
     def _of_subscript(self, node: ast.Subscript) -> Value:
         record, index = self._value(node.value), self._value(node.slice)
         if isinstance(index, Static):
-            return (
-                Static(record.value[index.value]) if isinstance(record, Static) else self._members(record)[index.value]
-            )
+            if isinstance(record, Static):
+                return Static(record.value[index.value])
+            return self._members(record)[cast(int, index.value)]
         if isinstance(record, Static):
             return Runtime(f'{self._all.constant(record.value)}[{_bare(index.code)}]', float)
         raise UntranslatableError('a place in a record that is not known')
 
     def _of_tuple(self, node: ast.Tuple) -> Value:
-        values = [self._value(each) for each in node.elts]
-        if all(isinstance(each, Static) for each in values):
-            return Static(tuple(cast(Static, each).value for each in values))
-        kinds = tuple(self._runtime(each).kind for each in values)
+        values = [self._runtime(self._value(each)) for each in node.elts]
+        kinds = tuple(each.kind for each in values)
         return Runtime(self._made(kinds, values), kinds)
 
     def _of_unaryop(self, node: ast.UnaryOp) -> Value:
         if isinstance(node.op, ast.Not):
-            test = self._test(node.operand)
-            return Static(not test.value) if isinstance(test, Static) else Runtime(f'!{test.code}', bool)
-        value = self._value(node.operand)
-        if isinstance(value, Static):
-            return Static(_OPERATORS[type(node.op)](value.value))
+            return _negated(self._test(node.operand))
+        value = self._runtime(self._value(node.operand))
         if isinstance(node.op, ast.Invert):
             return Runtime(f'(~{value.code})', int)
         return Runtime(f'(-{value.code})', float) if value.kind is float else Runtime(f'subtract(0, {value.code})', int)
 
     def _of_binop(self, node: ast.BinOp) -> Value:
-        first, second, kind = self._value(node.left), self._value(node.right), type(node.op)
-        if isinstance(first, Static) and isinstance(second, Static):
-            return Static(_OPERATORS[kind](first.value, second.value))
-        a, b = self._runtime(first), self._runtime(second)
+        a, b, kind = self._runtime(self._value(node.left)), self._runtime(self._value(node.right)), type(node.op)
         is_real = float in (a.kind, b.kind)
-        if a.kind not in SCALARS or b.kind not in SCALARS or (is_real and kind not in _REAL):
+        if a.kind not in SCALARS or b.kind not in SCALARS or kind not in (_REAL if is_real else {**_REAL, **_BITS}):
             raise UntranslatableError('an operator on what it is not for')
         if is_real:
             return Runtime(f'({a.code} {_REAL[kind]} {b.code})', float)
@@ -450,26 +387,15 @@ class _Body:
 
     def _compared(self, kind: ast.cmpop, a: Value, b: Value) -> Value:
         if isinstance(kind, ast.In | ast.NotIn):
-            links = [self._compared(ast.Eq(), a, each) for each in self._members(b)]
-            found = _joined(links, '||', decisive=True)
-            if isinstance(kind, ast.In):
-                return found
-            return Static(not found.value) if isinstance(found, Static) else Runtime(f'!{found.code}', bool)
-        if isinstance(a, Static) and isinstance(b, Static):
-            return Static(_OPERATORS[type(kind)](a.value, b.value))
+            found = _joined([self._compared(ast.Eq(), a, each) for each in self._members(b)], '||', decisive=True)
+            return found if isinstance(kind, ast.In) else _negated(found)
         if isinstance(kind, ast.Is | ast.IsNot):
             return Static(isinstance(kind, ast.IsNot))  # a number is not None
         return Runtime(f'({self._runtime(a).code} {_COMPARED[type(kind)]} {self._runtime(b).code})', bool)
 
     def _of_boolop(self, node: ast.BoolOp) -> Value:
-        is_or, links = isinstance(node.op, ast.Or), list[Value]()
-        self._lazy += 1
-        for each in node.values:
-            links.append(self._test(each))
-            if isinstance(links[-1], Static) and links[-1].value == is_or:
-                break
-        self._lazy -= 1
-        return _joined(links, '||' if is_or else '&&', decisive=is_or)
+        is_or = isinstance(node.op, ast.Or)
+        return _joined([self._test(each) for each in node.values], '||' if is_or else '&&', decisive=is_or)
 
     def _test(self, node: ast.expr) -> Value:
         """Truth of a value."""
@@ -482,12 +408,9 @@ class _Body:
         test = self._test(node.test)
         if isinstance(test, Static):
             return self._value(node.body if test.value else node.orelse)
-        self._lazy += 1
         body, otherwise = self._runtime(self._value(node.body)), self._runtime(self._value(node.orelse))
         kind = unified(body.kind, otherwise.kind)
-        chosen = f'({test.code} ? {self._as(body, kind)} : {self._as(otherwise, kind)})'
-        self._lazy -= 1
-        return Runtime(chosen, kind)
+        return Runtime(f'({test.code} ? {self._as(body, kind)} : {self._as(otherwise, kind)})', kind)
 
     # -- calls --------------------------------------------------------------------------------------------------------
 
@@ -496,73 +419,56 @@ class _Body:
         if not isinstance(called, Static):
             raise UntranslatableError('a call of what is not known')
         values = [self._value(each) for each in node.args]
-        named = {cast(str, each.arg): self._value(each.value) for each in node.keywords}
-        return self._called(called.value, values, named)
+        return self._called(called.value, values, {str(each.arg): self._value(each.value) for each in node.keywords})
 
     def _called(self, function: Any, values: list[Value], named: Mapping[str, Value]) -> Value:
         if function is send:
-            return self._sent(values)
+            return self._sent(*map(self._runtime, values[:2]))
         if function is replace:
-            return self._replaced(values[0], named)
-        if function is unrolled:
-            return values[0]
+            return self._replaced(self._runtime(values[0]), named)
         if function is evaluate:
             law = cast(Static, values[0]).value
             return self._called(law.func, [*map(Static, law.args), *values[1:]], {})
+        if function is bisect_right:
+            knots = cast(Static, values[0]).value
+            return Runtime(
+                f'last_place({self._all.constant(knots)}, {len(knots)}, {self._runtime(values[1]).code})', int
+            )
         if function is type:
             return Static(cast(Runtime, values[0]).kind)
-        if isinstance(function, type) and is_kind(function) and function not in SCALARS:
-            return self._record(function, values, named)
-        if not any(isinstance(each, Runtime) for each in (*values, *named.values())):
-            known = cast(list[Static], values), cast(dict[str, Static], named)
-            return Static(function(*(v.value for v in known[0]), **{n: v.value for n, v in known[1].items()}))
-        if not inspect.isfunction(function):
-            return self._of_builtin(function, values)
-        return self._of_function(function, values, named)
+        if not (inspect.isfunction(function) or is_kind(function)) or function in SCALARS:
+            return self._of_builtin(function, [self._runtime(value) for value in values])
+        parameters = inspect.signature(function).parameters
+        given = inspect.signature(function).bind(*values, **named).arguments
+        arguments = {name: given.get(name, Static(each.default)) for name, each in parameters.items()}
+        if is_kind(function):
+            return Runtime(self._made(function, [arguments[name] for name in fields_of(function)]), function)
+        return self._of_function(function, arguments)
 
-    def _of_function(self, function: Any, values: Sequence[Value], named: Mapping[str, Value]) -> Runtime:
+    def _of_function(self, function: Any, arguments: dict[str, Value]) -> Runtime:
         """Call of a function with a source. Static numbers are arguments, so that it is translated once."""
-        given, hints = inspect.signature(function).bind(*values, **named), _hints_of(function)
-        defaults = inspect.signature(function).parameters
-        arguments = dict[str, Value]()
-        for name, parameter in defaults.items():
-            value = given.arguments.get(name, Static(parameter.default))
-            if isinstance(value, Static) and type(value.value) in SCALARS:
-                value = self._runtime(value)
-            if isinstance(value, Runtime) and hints.get(name) is float and value.kind is not float:
-                value = Runtime(value.code, float)
-            arguments[name] = value
+        for name, value in arguments.items():
+            is_number = isinstance(value, Runtime) or type(value.value) in SCALARS
+            made = self._runtime(value) if is_number else value
+            is_float = isinstance(made, Runtime) and _hints_of(function).get(name) is float
+            arguments[name] = Runtime(cast(Runtime, made).code, float) if is_float else made
         name, kind = self._all.function(function, list(arguments.values()))
         codes = [_bare(each.code) for each in arguments.values() if isinstance(each, Runtime)]
         return Runtime(f'{name}({", ".join(codes)})', kind)
 
-    def _record(self, kind: Any, values: Sequence[Value], named: Mapping[str, Value]) -> Value:
-        given = inspect.signature(kind).bind(*values, **named)
-        defaults = inspect.signature(kind).parameters
-        members = {name: given.arguments.get(name, Static(p.default)) for name, p in defaults.items()}
-        if all(isinstance(each, Static) for each in members.values()):
-            return Static(kind(**{name: cast(Static, each).value for name, each in members.items()}))
-        return Runtime(self._made(kind, [members[name] for name in fields_of(kind)]), kind)
-
-    def _replaced(self, record: Value, changes: Mapping[str, Value]) -> Value:
-        held, fields = self._temporary(self._runtime(record)), fields_of(self._runtime(record).kind)
+    def _replaced(self, record: Runtime, changes: Mapping[str, Value]) -> Value:
+        held, fields = self._temporary(record), fields_of(record.kind)
         for name, value in changes.items():
             self._emit(f'{held.code}.{name} = {_bare(self._as(self._runtime(value), fields[name]))};')
         return held
 
-    def _sent(self, values: Sequence[Value]) -> Value:
-        answers, record = cast(Runtime, values[0]), self._runtime(values[1])
-        place = f'{answers.code}->{snake(record.kind.__name__)}'
-        self._emit(f'{place} = {record.code};')
-        self._emit(f'{answers.code}->has_{snake(record.kind.__name__)} = true;')
+    def _sent(self, answers: Runtime, record: Runtime) -> Value:
+        place = snake(record.kind.__name__)
+        self._emit(f'{answers.code}->{place} = {record.code};')
+        self._emit(f'{answers.code}->has_{place} = true;')
         return Static(None)
 
-    def _of_builtin(self, function: Any, values: Sequence[Value]) -> Value:
-        if function is bisect_right:
-            knots = cast(Static, values[0]).value
-            place = f'last_place({self._all.constant(knots)}, {len(knots)}, {self._runtime(values[1]).code})'
-            return Runtime(place, int)
-        each = [self._runtime(value) for value in values]
+    def _of_builtin(self, function: Any, each: Sequence[Runtime]) -> Value:
         codes, kind = ', '.join(_bare(one.code) for one in each), unified(each[0].kind, each[-1].kind)
         if function in _TESTS:
             return Runtime(f'(bool){_TESTS[function]}({codes})', bool)
@@ -578,12 +484,36 @@ class _Body:
         raise UntranslatableError(f'no C for {function!r}')
 
 
+_NAME = re.compile(r'(?<![.>\w])[a-zA-Z_]\w*')  # in C, of no member
+
 # -- syntax -----------------------------------------------------------------------------------------------------------
+
+
+class _Plain(ast.NodeTransformer):
+    """Statements in their plain form: ``a += b`` as an assignment, a choice of tuples as a branch."""
+
+    def visit_AugAssign(self, node: ast.AugAssign) -> ast.stmt:
+        return ast.Assign([node.target], ast.BinOp(_as_read(node.target), node.op, node.value))
+
+    def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.stmt:
+        return ast.Assign([node.target], cast(ast.expr, node.value))
+
+    def visit_Assign(self, node: ast.Assign) -> ast.stmt:
+        if isinstance(node.value, ast.IfExp) and isinstance(node.targets[0], ast.Tuple):
+            body, otherwise = (ast.Assign(node.targets, each) for each in (node.value.body, node.value.orelse))
+            return ast.If(node.value.test, [body], [otherwise])
+        return node
+
+    def visit_Return(self, node: ast.Return) -> ast.stmt:
+        if isinstance(node.value, ast.IfExp) and isinstance(node.value.body, ast.Tuple):
+            return ast.If(node.value.test, [ast.Return(node.value.body)], [ast.Return(node.value.orelse)])
+        return node
 
 
 @cache
 def _tree_of(function: Any) -> ast.FunctionDef:
-    return cast(ast.FunctionDef, ast.parse(textwrap.dedent(inspect.getsource(function))).body[0])
+    tree = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
+    return cast(ast.FunctionDef, _Plain().visit(tree))
 
 
 @cache
@@ -591,9 +521,14 @@ def _hints_of(function: Any) -> dict[str, Any]:
     return get_type_hints(function)
 
 
-def _stored(tree: ast.AST) -> list[str]:
-    """Names that are set, once for each place."""
-    return [node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)]
+@cache
+def _names_in(node: ast.expr) -> frozenset[str]:
+    return frozenset(each.id for each in ast.walk(node) if isinstance(each, ast.Name))
+
+
+@cache
+def _code_of(node: ast.expr) -> Any:
+    return compile(ast.unparse(node), '<static>', 'eval')
 
 
 def _as_read(node: ast.expr) -> ast.expr:
@@ -602,8 +537,8 @@ def _as_read(node: ast.expr) -> ast.expr:
 
 def _names_read(lines: Sequence[str]) -> set[str]:
     """Names in statements of C but for those that these set."""
-    read = re.sub(r'^ *([a-z]\w* \*?)?\w+ = |\(void\)\w+;', '', '\n'.join(lines), flags=re.MULTILINE)
-    return set(re.findall(r'(?<![.>\w])[a-zA-Z_]\w*', read))
+    read = re.sub(r'^ *([a-z]\w* \*?)?\w+ = ', '', '\n'.join(lines), flags=re.MULTILINE)
+    return set(_NAME.findall(read))
 
 
 def _c_name(name: str) -> str:
@@ -612,6 +547,14 @@ def _c_name(name: str) -> str:
 
 def _mentions(value: Value, place: str) -> bool:
     return isinstance(value, Runtime) and re.search(rf'(?<![\w.>]){re.escape(place)}\b', value.code) is not None
+
+
+def _zero(kind: Any) -> str:
+    return '0' if kind in SCALARS or is_mutable(kind) else '{0}'
+
+
+def _negated(value: Value) -> Value:
+    return Static(not value.value) if isinstance(value, Static) else Runtime(f'!{value.code}', bool)
 
 
 def _joined(links: Sequence[Value], sign: str, *, decisive: bool) -> Value:
@@ -626,14 +569,8 @@ def _joined(links: Sequence[Value], sign: str, *, decisive: bool) -> Value:
 
 def _bare(code: str) -> str:
     """Code without the brackets around all of it."""
-    if not code.startswith('('):
-        return code
-    return code[1:-1] if next(_closing(code)) == len(code) - 1 else code
-
-
-def _closing(code: str) -> Iterator[int]:
-    depth = 0
+    depth, ends = 0, []
     for i, character in enumerate(code):
         depth += {'(': 1, ')': -1}.get(character, 0)
-        if depth == 0:
-            yield i
+        ends += [i] if depth == 0 else []
+    return code[1:-1] if code.startswith('(') and ends[0] == len(code) - 1 else code
