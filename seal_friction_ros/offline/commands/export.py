@@ -42,10 +42,12 @@ def _add_configuration(parser: argparse.ArgumentParser) -> None:
 
 
 def _configuration(arguments: argparse.Namespace) -> Any:
-    from seal_friction_ros.files import default_configuration
     from seal_friction_ros.offline.replay.replay import chosen_configuration
 
-    return chosen_configuration(arguments.params, arguments.seals) or default_configuration()
+    chosen = chosen_configuration(arguments.params, arguments.seals)
+    if chosen is None:
+        raise ValueError('export: no seals: name their seal files, or a parameter file with the parameter seals')
+    return chosen.without_placeholder_force()
 
 
 def run_c(arguments: argparse.Namespace) -> int:

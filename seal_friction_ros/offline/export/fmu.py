@@ -115,7 +115,19 @@ def _built(files: dict[str, str]) -> bytes:
         for name, text in files.items():
             (Path(folder) / name).write_text(text, encoding='utf-8')
         inputs = [name for name in files if name.endswith('.c')]
-        command = ['cc', '-std=c11', '-O2', '-ffp-contract=off', '-fPIC', '-shared', '-o', 'fmu.so', *inputs, '-lm']
+        command = [
+            'cc',
+            '-std=c11',
+            '-O2',
+            '-ffp-contract=off',
+            '-fPIC',
+            '-shared',
+            '-Wl,-Bsymbolic',
+            '-o',
+            'fmu.so',
+            *inputs,
+            '-lm',
+        ]
         subprocess.run(command, cwd=folder, check=True, capture_output=True)
         return (Path(folder) / 'fmu.so').read_bytes()
 

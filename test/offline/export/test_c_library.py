@@ -193,12 +193,14 @@ def test_the_library_tells_its_configuration_and_needs_nothing_but_libm(exported
     assert not re.findall(r' [bBdD] (?!_|completed)(\w+)', symbols)  # no hidden state
 
 
-def test_a_folder_of_somebody_else_and_a_name_that_c_does_not_take_are_refused(tmp_path: Path, capsys):
+def test_a_folder_of_somebody_else_a_name_that_c_does_not_take_and_no_seals_are_refused(tmp_path: Path, capsys):
     (tmp_path / 'mine.txt').write_text('mine')
     assert main(['export', 'c', 'delft_o_ring', '--out', str(tmp_path)]) == 2
     assert 'a folder but no C library' in capsys.readouterr().err
     assert main(['export', 'c', 'delft_o_ring', '--name', 'my-lib', '--out', str(tmp_path / 'new')]) == 2
     assert '--name my-lib' in capsys.readouterr().err
+    assert main(['export', 'c', '--out', str(tmp_path / 'new')]) == 2
+    assert 'no seals' in capsys.readouterr().err
     assert not (tmp_path / 'new').exists()
 
 
