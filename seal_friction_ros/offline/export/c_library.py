@@ -80,7 +80,7 @@ def export_c(configuration: Configuration, folder: Path, name: str = 'seal_frict
         (folder / file_name).write_text(text, encoding='utf-8')
     can_build = all(map(shutil.which, ('make', 'cc', 'c++')))
     if can_build:
-        subprocess.run(['make', '-s', '-C', str(folder)], check=True, capture_output=True)
+        subprocess.run(['make', '-s', '-C', str(folder), 'build'], check=True, capture_output=True)
     return Export(folder, digest(document), can_build)
 
 
