@@ -6,6 +6,7 @@
 The binary is for this machine; the sources in the FMU are for all others.
 """
 
+import math
 import platform
 import shutil
 import subprocess
@@ -20,7 +21,7 @@ from seal_friction_ros.core.estimation.loop import LoopSample, RodLoad
 from seal_friction_ros.core.friction.states import StateFriction
 from seal_friction_ros.core.messages.records import FeedForward, FrictionEstimate
 from seal_friction_ros.offline.export.c_library import digest, filled, sources
-from seal_friction_ros.offline.export.c_types import fields_of, meanings_of
+from seal_friction_ros.offline.export.c_types import fields_of, meanings_of, number
 
 PLATFORMS = {('2', 'x86_64'): 'linux64', ('3', 'x86_64'): 'x86_64-linux', ('3', 'aarch64'): 'aarch64-linux'}
 """FMI version and machine -> folder of the binary; no binary for others."""
@@ -104,9 +105,7 @@ def _source(model: str, fmi: str, name: str) -> str:
         places[each.kind] += f'    case {reference}: return &self->{each.place};\n'
     inputs = sum(each.is_input for each in variables(model))
     values = {'reals': places[float], 'integers': places[int], 'inputs': str(inputs), 'name': name, 'fmi': fmi}
-    starts = ' '.join(
-        f'self->{v.place} = {"NAN" if v.start != v.start else v.start};' for v in variables(model)[:inputs]
-    )
+    starts = ' '.join(f'self->{each.place} = {number(each.start)};' for each in variables(model)[:inputs])
     return filled('fmu.c', {**values, 'starts': starts, 'is_estimator': str(int(model == 'estimator'))})
 
 
@@ -152,7 +151,7 @@ def _description(model: str, fmi: str, name: str, token: str) -> str:
         for kind in kinds
     ]
     head = {'2': f'guid="{token}" numberOfEventIndicators="0"', '3': f'instantiationToken="{token}"'}[fmi]
-    known, write = variables(model), {'2': _variable_2, '3': _variable_3}[fmi]
+    known = variables(model)
     outputs = [i for i, each in enumerate(known, start=1) if not each.is_input]
     if fmi == '2':
         unknowns = ''.join(f'<Unknown index="{i + 1}"/>' for i in outputs)
@@ -162,7 +161,7 @@ def _description(model: str, fmi: str, name: str, token: str) -> str:
     return '\n'.join([
         '<?xml version="1.0" encoding="UTF-8"?>',
         f'<fmiModelDescription fmiVersion="{fmi}.0" modelName="{name}" {head} generationTool="seal_friction export">',
-        *interfaces, '<ModelVariables>', *(write(i, each) for i, each in enumerate([_TIME, *known])),
+        *interfaces, '<ModelVariables>', *(_variable(fmi, i, each) for i, each in enumerate([_TIME, *known])),
         '</ModelVariables>', '<ModelStructure>', *lists, '</ModelStructure>', '</fmiModelDescription>', '',
     ])  # fmt: skip
 
@@ -170,22 +169,13 @@ def _description(model: str, fmi: str, name: str, token: str) -> str:
 _TIME = Variable('time', '', float, False, 0.0, '[s]')
 
 
-def _attributes(reference: int, each: Variable) -> tuple[str, str]:
+_TAGS = {('2', float): 'Real', ('2', int): 'Integer', ('3', float): 'Float64', ('3', int): 'Int64'}
+
+
+def _variable(fmi: str, reference: int, each: Variable) -> str:
     causality = 'independent' if each is _TIME else 'input' if each.is_input else 'output'
-    variability = 'continuous' if each.kind is float else 'discrete'
-    start = f' start="{"NaN" if each.start != each.start else each.start}"' if each.is_input else ''
-    about = f' description={quoteattr(each.meaning)}' if each.meaning else ''
-    return (
-        f'name="{each.name}" valueReference="{reference}" causality="{causality}" variability="{variability}"{about}',
-        start,
-    )
-
-
-def _variable_2(reference: int, each: Variable) -> str:
-    given, start = _attributes(reference, each)
-    return f'<ScalarVariable {given}><{"Real" if each.kind is float else "Integer"}{start}/></ScalarVariable>'
-
-
-def _variable_3(reference: int, each: Variable) -> str:
-    given, start = _attributes(reference, each)
-    return f'<{"Float64" if each.kind is float else "Int64"} {given}{start}/>'
+    variability, tag = 'continuous' if each.kind is float else 'discrete', _TAGS[fmi, each.kind]
+    start = f' start="{"NaN" if math.isnan(each.start) else each.start}"' if each.is_input else ''
+    given = f'name="{each.name}" valueReference="{reference}" causality="{causality}" variability="{variability}"'
+    given += f' description={quoteattr(each.meaning)}' if each.meaning else ''
+    return f'<ScalarVariable {given}><{tag}{start}/></ScalarVariable>' if fmi == '2' else f'<{tag} {given}{start}/>'

@@ -67,6 +67,16 @@ static int set_reals(instance *self, const uint32_t *references, size_t n, const
     return OK;
 }
 
+/* Integers of FMI 2.0 have 32 bits. */
+#define GET_INTEGERS(type) \
+    if (!ESTIMATOR) ((instance *)self)->friction = ${name}_friction_on_rod(((instance *)self)->load); \
+    for (size_t i = 0; i < n; i++) { \
+        const int64_t *place = integer_at(self, references[i]); \
+        if (!place) return ERROR; \
+        values[i] = (type)*place; \
+    } \
+    return OK;
+
 static int step(instance *self, double time, double size)
 {
     self->time = time + size;
@@ -92,17 +102,7 @@ void fmi2FreeInstance(void *self) { free(self); }
 int fmi2Reset(void *self) { return reset(self); }
 int fmi2GetReal(void *self, const uint32_t *r, size_t n, double *v) { return get_reals(self, r, n, v); }
 int fmi2SetReal(void *self, const uint32_t *r, size_t n, const double *v) { return set_reals(self, r, n, v); }
-int fmi2GetInteger(void *self, const uint32_t *references, size_t n, int *values)
-{
-    double now;
-    get_reals(self, NULL, 0, &now);
-    for (size_t i = 0; i < n; i++) {
-        const int64_t *place = integer_at(self, references[i]);
-        if (!place) return ERROR;
-        values[i] = (int)*place;
-    }
-    return OK;
-}
+int fmi2GetInteger(void *self, const uint32_t *references, size_t n, int *values) { GET_INTEGERS(int) }
 int fmi2DoStep(void *self, double time, double size, int none_back) { (void)none_back; return step(self, time, size); }
 int fmi2SetTime(void *self, double time) { ((instance *)self)->time = time; return OK; }
 int fmi2CompletedIntegratorStep(void *self, int none_back, int *enter, int *stop)
@@ -145,15 +145,8 @@ int fmi3GetFloat64(void *self, const uint32_t *r, size_t n, double *v, size_t m)
 int fmi3SetFloat64(void *self, const uint32_t *r, size_t n, const double *v, size_t m) { (void)m; return set_reals(self, r, n, v); }
 int fmi3GetInt64(void *self, const uint32_t *references, size_t n, int64_t *values, size_t m)
 {
-    double now;
     (void)m;
-    get_reals(self, NULL, 0, &now);
-    for (size_t i = 0; i < n; i++) {
-        const int64_t *place = integer_at(self, references[i]);
-        if (!place) return ERROR;
-        values[i] = *place;
-    }
-    return OK;
+    GET_INTEGERS(int64_t)
 }
 int fmi3DoStep(void *self, double time, double size, bool none_back, bool *event, bool *stop, bool *early, double *last)
 {
