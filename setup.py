@@ -43,6 +43,7 @@ setup(
     package_data={
         NAME: ['py.typed'],
         f'{NAME}.offline.reports': ['templates/*.html', 'templates/*.js'],
+        f'{NAME}.offline.export': ['templates/*'],
         f'{NAME}.offline.monitor': ['page/*'],
         STUDIES: ['py.typed'],
         f'{STUDIES}.offline': ['templates/*.html'],

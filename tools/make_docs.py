@@ -160,6 +160,7 @@ PAGES_OF_COMMANDS = {
     'bag': 'machines.md',
     'compare': 'recording.md#replay-in-ci',
     'doctor': 'installation.md',
+    'export': 'loop.md',
     'ehl': 'ehl.md',
     'fleet': 'scale.md#a-page-over-many-bags',
     'health': 'estimation.md#commands',

@@ -15,6 +15,7 @@ from seal_friction_ros.offline.commands import (
     bags,
     doctor,
     ehl,
+    export,
     health,
     identify,
     import_data,
@@ -38,7 +39,7 @@ GROUPS = {
     'watch': (monitor, topics, health),
     'tune': (tune,),
     'compute': (oring, ehl),
-    'machine': (new, doctor),
+    'machine': (new, export, doctor),
 }
 
 # Before numpy is loaded: the last bits of a sum depend on the number of threads, and the long, narrow matrices of a fit
