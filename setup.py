@@ -70,7 +70,8 @@ setup(
             'cloudpickle==3.1.2',
             'pyarrow==26.0.1',
             'fsspec==2026.9.0',
-        ]
+        ],
+        'drawings': ['ezdxf==1.4.5'],  # DXF of a seal section
     },
     maintainer='seal_friction_ros maintainers',
     maintainer_email='maintainers@seal-friction.invalid',

@@ -21,11 +21,15 @@ from seal_friction_ros.core.oring_contact.equilibrium import (
     solve_equilibrium,
     unstressed_state,
 )
+from seal_friction_ros.core.oring_contact.material import rubber_field
 from seal_friction_ros.core.oring_contact.mesh import o_grid
 from seal_friction_ros.core.oring_contact.oring_case import OringCase, check_pressures
+from seal_friction_ros.core.oring_contact.section import first_crossing, placed
+from seal_friction_ros.core.oring_contact.section_mesh import inside, section_mesh
 from seal_friction_ros.core.oring_contact.surroundings import (
     GLAND,
     ROD,
+    WALL,
     Surroundings,
     node_areas,
     surface_pressure,
@@ -50,6 +54,14 @@ class LoadedRing(NamedTuple):
 def oring_model(case: OringCase) -> OringModel:
     """Model of a case."""
     geometry, numerics = case.geometry, case.numerics
+    if case.section is not None:
+        section = placed(case.section, geometry.ring_inner_diameter, geometry.section_diameter)
+        mesh = section_mesh(section, 0.25 * math.pi * geometry.section_diameter / (numerics.lines - 1))
+        field = None
+        if section.cap is not None:
+            in_cap = inside(mesh.nodes[mesh.elements].mean(axis=1), section.cap)
+            field = rubber_field((case.rubber, case.cap or case.rubber), in_cap.astype(int))
+        return make_model(mesh, case.rubber, geometry.section_diameter, 0.0, field)
     center = (geometry.ring_inner_diameter + geometry.section_diameter) / 2.0
     mesh = o_grid(geometry.section_diameter, center, numerics.lines)
     return make_model(mesh, case.rubber, geometry.section_diameter, numerics.guide)
@@ -76,6 +88,7 @@ def loaded_states(case: OringCase, model: OringModel, pressures: tuple[float, ..
         now, next_rise = _raise_pressure(case, model, free, base, pressure, rise)
         loaded = _apply_wall_friction(case, model, free, now)
         _check_sealed(case, model, loaded)
+        _check_unfolded(case, model, loaded)
         yield loaded
         if pressure > lowest:  # at lower pressure the wall hardly supports the ring: a poor start for the next step
             base, rise = now, next_rise
@@ -106,7 +119,8 @@ def squeeze_ring(case: OringCase, model: OringModel) -> LoadedRing:
         return walls._replace(penalty=walls.penalty * _SOFTER ** (share - 1.0))
 
     with _named(case, 'of the squeezed ring'):
-        closed = follow_path(model, assembly, closing, unstressed_state(model), _SQUEEZE_STRIDE, stretched)
+        guess = stretched if case.section is None else None
+        closed = follow_path(model, assembly, closing, unstressed_state(model), _SQUEEZE_STRIDE, guess)
         reached = follow_path(model, assembly, stiffening, closed.state, _STIFFEN_STRIDE)
     length = float(np.ptp(outline(model, reached.state)[:, 1]))
     if length >= case.groove.width:
@@ -132,8 +146,9 @@ def seat_ring(case: OringCase, model: OringModel, free: Assembly, squeezed: Load
     with _named(case, 'of the ring on the downstream wall'):
         state, steps = solve_equilibrium(model, make_assembly(model, _fixed(model)), wall, squeezed.state)
         position = outline(model, state)
-        axial = surface_pressure(wall, position).total * node_areas(position)[:, 1]
-        pressure = float(axial[position[:, 1] > 0.0].sum()) / projected_area(case.geometry)
+        stress = surface_pressure(wall, position)
+        axial = stress.total * stress.shares[:, 1 + WALL] * node_areas(position)[:, 1]
+        pressure = float(axial.sum()) / projected_area(case.geometry)
         surroundings = wall._replace(pressure=pressure, wetted=wetted_nodes(wall, position))
         state, more = solve_equilibrium(model, free, surroundings, state)
     return LoadedRing(pressure, surroundings, state, squeezed.newton_steps + steps + more)
@@ -144,11 +159,27 @@ def _named(case: OringCase, which: str) -> AbstractContextManager[None]:
 
 
 def wetted_nodes(surroundings: Surroundings, position: FloatArray) -> BoolArray:
-    """Whether each node of the outline is upstream of the peak contact stresses on rod and gland, shape (s,)."""
+    """Whether each node of the outline is upstream of the lips on rod and gland that hold the fluid, shape (s,)."""
     stresses = wall_stresses(surroundings, position)
-    rod, gland = int(np.argmax(stresses[:, ROD])), int(np.argmax(stresses[:, GLAND]))
+    away = np.where(stresses.max(axis=1) < 0.0, position[:, 1], np.inf)
+    start = int(np.argmin(away))
+    rod = _holding(stresses[:, ROD], surroundings.pressure, start, -1)
+    gland = _holding(stresses[:, GLAND], surroundings.pressure, start, 1)
     wetted: BoolArray = (np.arange(len(position)) - rod) % len(position) <= (gland - rod) % len(position)
     return wetted
+
+
+def _holding(stress: FloatArray, pressure: float, start: int, direction: int) -> int:
+    """Node with the peak stress of the first lip, from ``start`` on, that is above the pressure; else the highest one.
+
+    The fluid passes a lip whose peak stress is below its pressure; a lip ends where the stress has fallen to half of
+    its peak (our choice).
+    """
+    order = (start + direction * np.arange(len(stress))) % len(stress)
+    along = stress[order]
+    peak = np.maximum.accumulate(along)
+    behind = np.flatnonzero((peak > max(pressure, 0.0)) & (along < 0.5 * peak))
+    return int(order[np.argmax(along[: behind[0]] if len(behind) else along)])
 
 
 def _fixed(model: OringModel) -> tuple[int]:
@@ -162,8 +193,8 @@ def _raise_pressure(
     """Ring under the pressure ``target`` [Pa], and the pressure rise [Pa] to try in the next step."""
 
     def rising(share: float, state: OringState) -> Surroundings:
-        wetted = wetted_nodes(now.surroundings, outline(model, state))
-        return now.surroundings._replace(pressure=now.pressure + share * (target - now.pressure), wetted=wetted)
+        risen = now.surroundings._replace(pressure=now.pressure + share * (target - now.pressure))
+        return risen._replace(wetted=wetted_nodes(risen, outline(model, state)))
 
     total_rise = abs(target - now.pressure)
     with _named(case, f'between {now.pressure:.6g} and {target:.6g} Pa'):
@@ -193,6 +224,17 @@ def _check_sealed(case: OringCase, model: OringModel, now: LoadedRing) -> None:
                 f'case {case.name}: at {now.pressure:.6g} Pa the fluid passes the ring at the {name}: the peak '
                 f'contact stress there is {highest[wall]:.6g} Pa'
             )
+
+
+def _check_unfolded(case: OringCase, model: OringModel, now: LoadedRing) -> None:
+    """A section whose outline crosses itself would touch itself, a contact that is not computed."""
+    crossing = None if case.section is None else first_crossing(outline(model, now.state))
+    if crossing is not None:
+        r, z = crossing
+        raise ValueError(
+            f'case {case.name}: at {now.pressure:.6g} Pa the section folds onto itself at r = {r:.6g} m, '
+            f'z = {z:.6g} m: contact of a seal with itself is not computed'
+        )
 
 
 def _dry_walls(case: OringCase, model: OringModel) -> Surroundings:
