@@ -40,6 +40,7 @@ _SOFTER = 100.0  # factor by which the penalty is reduced during squeezing
 _SQUEEZE_STRIDE, _STIFFEN_STRIDE, _FRICTION_STRIDE = 1.0, 0.5, 0.1  # first steps, as fractions of their paths
 _DRY = 0.1  # transition without fluid over transition with fluid
 _SEATING = 1e-3  # first penetration of the ring into the downstream wall, over d
+_FLAT_SEATING = 0.02  # first stress of another section, which may be flat there, on that wall over E
 
 
 class LoadedRing(NamedTuple):
@@ -138,9 +139,10 @@ def seat_ring(case: OringCase, model: OringModel, free: Assembly, squeezed: Load
     stays fixed while the wall takes load; it is then released under the pressure that balances the wall force.
     NotConvergedError: Newton's method did not converge.
     """
+    seating = _SEATING if case.section is None else _FLAT_SEATING / case.numerics.penalty
     top = float(outline(model, squeezed.state)[:, 1].max())
     wall = squeezed.surroundings._replace(
-        wall_position=top - _SEATING * case.geometry.section_diameter,
+        wall_position=top - seating * case.geometry.section_diameter,
         transition=case.numerics.transition * case.rubber.elastic_modulus,
     )
     with _named(case, 'of the ring on the downstream wall'):
@@ -248,6 +250,7 @@ def _dry_walls(case: OringCase, model: OringModel) -> Surroundings:
         wetted=np.zeros(len(model.mesh.surface), dtype=bool),
         penalty=case.numerics.penalty * elastic_modulus / geometry.section_diameter,
         transition=_DRY * case.numerics.transition * elastic_modulus,
+        faces_walls=case.section is not None,
     )
 
 

@@ -88,7 +88,11 @@ def evaluate_contact(model: OringModel, loaded: LoadedRing) -> OringResult:
     """Contact, forces and shape of an equilibrium."""
     position = outline(model, loaded.state)
     pressure = walls.surface_pressure(loaded.surroundings, position)
-    axial = _axial_force(pressure, walls.node_areas(position)[:, 1], _upstream(loaded, position))
+    upstream = _upstream(loaded, position)
+    if loaded.surroundings.faces_walls:
+        axial = float(walls.surface_forces(loaded.surroundings, position).force[~upstream, 1].sum())
+    else:
+        axial = _axial_force(pressure, walls.node_areas(position)[:, 1], upstream)
     gradient = deformation_gradient(model.elements, loaded.state.displacement)
     volumes = model.elements.weights.sum(axis=1)
     ratios = volume_ratios(model.elements, gradient)
@@ -131,11 +135,16 @@ def _contact(loaded: LoadedRing, position: FloatArray, wall: int) -> WallContact
     near = (stresses.argmax(axis=1) == wall) & (stresses[:, wall] > -_TOUCHING * surroundings.transition)
     areas = np.linalg.norm(walls.node_areas(position), axis=1)
     stress = walls.surface_pressure(surroundings, position).contact_stress
+    fluid = np.where(surroundings.wetted, surroundings.pressure, 0.0)
+    if surroundings.faces_walls:
+        near = stresses[:, wall] > -_TOUCHING * surroundings.transition
+        areas = walls.facing_areas(position, wall)
+        contacts = walls.wall_contacts(surroundings, position)
+        stress = contacts.excess[:, wall] + contacts.share[:, wall] * fluid
     force = float((stress * areas)[near].sum())
     along = position[:, 0] if wall == walls.WALL else position[:, 1]
-    fluid = np.where(surroundings.wetted, surroundings.pressure, 0.0)
     inside = near & (stresses[:, wall] > fluid)
-    wall_force = float((stresses[:, wall] * areas)[inside].sum())
+    wall_force = float((stresses[inside, wall] * areas[inside]).sum())
     if not inside.any():
         return WallContact(np.zeros(0), np.zeros(0), force, 0.0, 0.0, (0.0, 0.0))
     touching = np.flatnonzero(inside)
@@ -144,6 +153,8 @@ def _contact(loaded: LoadedRing, position: FloatArray, wall: int) -> WallContact
     lips = np.split(touching, np.flatnonzero((apart > 1) & (apart < len(along) - 1)) + 1)
     above = stresses[:, wall] - fluid
     edges = [(_edge(along[lip], above[lip]), _edge(along[lip][::-1], above[lip][::-1])) for lip in lips]
+    if surroundings.faces_walls:  # a contact ends at a corner
+        edges = [_inside_corners(along, lip, ends) for lip, ends in zip(lips, edges, strict=True)]
     places, values, gaps = [along[lips[0]]], [stress[lips[0]]], 0.0
     for lip, before, after in zip(lips[1:], edges, edges[1:], strict=False):
         gap = np.sort([before[1], after[0]])  # two lips that all but touch overlap
@@ -170,6 +181,15 @@ def _power_integral(place: FloatArray, value: FloatArray, exponent: float) -> fl
     mean = (high**power - low**power) / (power * np.where(flat, 1.0, rise))
     mean = np.where(flat, high ** (0.5 * exponent), mean)
     return float(np.where(high > 0.0, mean, 0.0) @ np.diff(place))
+
+
+def _inside_corners(along: FloatArray, lip: IntArray, edges: tuple[float, float]) -> tuple[float, float]:
+    """Edges of a lip, moved to the next nodes of the outline where these lie nearer, to halfway for a single node."""
+    around = np.concatenate((along[lip - 1], along[(lip + 1) % len(along)], along[lip]))
+    if len(lip) == 1:
+        around = 0.5 * (around + along[lip])
+        return float(around.min()), float(around.max())
+    return max(edges[0], float(around.min())), min(edges[1], float(around.max()))
 
 
 def _edge(position: FloatArray, above: FloatArray) -> float:

@@ -158,25 +158,21 @@ def u_cup(
     return Section(checked_outline(outer, 'u_cup'))
 
 
-def capped_ring(cap_height: float = 0.3, cap_length: float = 0.9, bond: float = 0.84) -> Section:
-    """Capped ring of height 1: a rectangular cap on the inside, bonded over a width ``bond`` to a ring, else round.
+def capped_ring(cap_height: float = 0.3, cap_length: float = 0.8) -> Section:
+    """Capped ring of height 1: a rectangular cap on the inside, its back bonded to a ring that is round elsewhere.
 
     A whole ring would touch the cap along a line and roll onto it, a contact of the seal with itself, which is not
-    computed: its flat is as wide as it lies on the cap under pressure.
+    computed: it is cut flat as wide as the cap is long.
     """
-    left = 1.0 - cap_height  # radius + sqrt(radius^2 - bond^2 / 4)
-    radius = 0.5 * (left + 0.25 * bond**2 / left)
+    left = 1.0 - cap_height  # radius + sqrt(radius^2 - half^2)
     half, bevel = 0.5 * cap_length, 0.1 * cap_height
-    if not (0.05 <= cap_height < 0.8 and 0.0 < bond < cap_length and 0.5 * bond < left):
-        raise ValueError('capped_ring: cap_height 0.05 to 0.8, bond below cap_length and twice the rest are needed')
-    ends = np.pi - np.arcsin(0.5 * bond / radius)
+    if not (0.05 <= cap_height < 0.8 and 0.0 < half < left):
+        raise ValueError('capped_ring: cap_height 0.05 to 0.8, and cap_length below twice the rest, are needed')
+    radius = 0.5 * (left + half**2 / left)
+    ends = np.pi - np.arcsin(half / radius)
     round_part = _arc((1.0 - radius, 0.0), radius, -ends, ends)
-    cap = np.array([
-        (cap_height, half), (bevel, half), (0.0, half - bevel),
-        (0.0, bevel - half), (bevel, -half), (cap_height, -half),
-    ])  # fmt: skip
-    outline = np.concatenate((round_part, cap))
-    return Section(outline, np.concatenate((round_part[-1:], cap, round_part[:1])))
+    face = np.array([(bevel, half), (0.0, half - bevel), (0.0, bevel - half), (bevel, -half)])
+    return Section(np.concatenate((round_part, face)), np.concatenate((round_part[-1:], face, round_part[:1])))
 
 
 Shape = Callable[..., Section]

@@ -7,7 +7,7 @@ import pytest
 
 from seal_friction_ros.core.friction.geometry import SealGeometry, projected_area
 from seal_friction_ros.core.oring_contact.elements import make_elements
-from seal_friction_ros.core.oring_contact.loading import _holding, loaded_states, oring_model
+from seal_friction_ros.core.oring_contact.loading import _check_unfolded, _holding, loaded_states, oring_model
 from seal_friction_ros.core.oring_contact.material import Rubber
 from seal_friction_ros.core.oring_contact.oring_case import Groove, OringCase, OringNumerics
 from seal_friction_ros.core.oring_contact.results import OringResult, evaluate_contact, oring_results
@@ -191,9 +191,73 @@ def test_fluid_passes_a_lip_whose_stress_is_below_its_pressure():
 
 
 def test_a_section_that_folds_onto_itself_is_refused():
-    # two legs so thin that the pressure between them and the walls bends one over the other
-    loose = dataclasses.replace(
-        seal(None), section=Section(checked_outline(SHAPES['capped_ring'](bond=0.3).outline, 'mine'))
+    case = seal('u_cup')
+    model = oring_model(case)
+    free = next(loaded_states(case, model, (0.0,)))
+    across = free.state.displacement.copy()
+    node = model.mesh.surface[np.argmin(model.mesh.nodes[model.mesh.surface, 1])]  # the tip of a lip
+    across[2 * node] += RING.section_diameter
+    with pytest.raises(ValueError, match='mine: at 0 Pa the section folds onto itself at r = '):
+        _check_unfolded(case, model, free._replace(state=free.state._replace(displacement=across)))
+
+
+def test_a_lip_that_touches_with_its_edge_alone_has_friction():
+    contact = at(dataclasses.replace(seal('u_cup'), rubber=Rubber(elastic_modulus=20e6)), 0.0).gland
+    assert 0.0 < contact.width < 0.3e-3
+    assert contact.sheared_area(1.0) == pytest.approx(contact.force / 1e6)
+    assert contact.sheared_area(0.0) > 0.0
+
+
+# -- exact solution: a block between smooth walls, squeezed by a tenth, in plane strain ------------------------------
+
+
+def block(cap: np.ndarray | None = None) -> OringCase:
+    """Ring of rectangular section, 2 mm high and 3 mm long, so large that its hoop hardly strains."""
+    corners = np.array([(0.0, 1.5), (0.0, -1.5), (0.9, -1.5), (2.0, -1.5), (2.0, 1.5), (0.9, 1.5)])
+    inner, height = 0.4, 2e-3
+    return OringCase(
+        name='block',
+        geometry=SealGeometry(
+            section_diameter=height,
+            ring_inner_diameter=inner - 0.1 * height,
+            rod_diameter=inner,
+            gland_diameter=inner + 1.8 * height,
+        ),
+        groove=Groove(width=4e-3),
+        rubber=Rubber(elastic_modulus=6e6),
+        numerics=OringNumerics(lines=13, transition=0.01, penalty=1e4),
+        section=Section(checked_outline(corners, 'block'), cap),
+        cap=None if cap is None else Rubber(elastic_modulus=60e6),
     )
-    with pytest.raises(ValueError, match=r'folds onto itself at r = |no equilibrium'):
-        at(loose, 2e6)
+
+
+def middle_stress(result: OringResult) -> float:
+    """Contact stress in the middle half of the contact on the rod [Pa]."""
+    place, stress = result.rod.position, result.rod.stress
+    center = 0.5 * (place[0] + place[-1])
+    return float(stress[np.abs(place - center) < 0.25 * np.ptp(place)].mean())
+
+
+@pytest.mark.parametrize('pressure', [0.0, 4e6])
+def test_a_rectangular_ring_has_the_exact_stress_of_plane_strain(pressure: float):
+    squeezed = 6e6 / 3.0 * (1.0 / 0.9**2 - 0.9**2)  # G (lambda_z^2 - lambda_r^2) without pressure, p more with it
+    assert middle_stress(at(block(), pressure)) == pytest.approx(squeezed + pressure, rel=0.01)
+
+
+def test_a_cap_and_its_energiser_share_the_squeeze_as_two_springs():
+    cap = np.array([(0.9, 1.5), (0.0, 1.5), (0.0, -1.5), (0.9, -1.5)])
+
+    def stress(modulus: float, stretch: float) -> float:
+        return modulus / 3.0 * (stretch**-2 - stretch**2)
+
+    def squeezed(rubber: float) -> float:
+        """Height of both layers, with the stretch of the rubber and the same stress in the cap."""
+        caps = np.linspace(0.5, 1.0, 100001)
+        return 1.1 * rubber + 0.9 * float(np.interp(-stress(6e6, rubber), -stress(60e6, caps), caps))
+
+    # smooth walls, but bonded layers: far from the ends both have one axial stretch only if they are equally stiff, so
+    # the stress lies between that of free layers in series and that of layers which stretch together
+    stretches = np.linspace(0.7, 1.0, 3001)
+    series = stress(6e6, float(np.interp(1.8, [squeezed(s) for s in stretches], stretches)))
+    together = stress(0.55 * 6e6 + 0.45 * 60e6, 0.9)
+    assert series < middle_stress(at(block(cap), 0.0)) < together
