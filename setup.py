@@ -27,6 +27,7 @@ setup(
         shared('config', '*.yaml'),
         shared('config', '*.xml'),
         shared('config/seals', '*.yaml'),
+        shared('config/seals/catalogue', '*.yaml'),
         shared('config/layouts', '*.json'),
         shared('config/layouts', '*.xml'),
         shared('config/machines', '*.yaml'),
