@@ -1,4 +1,4 @@
-"""Picture of three sections in their glands with the contact stress below: ``python tools/section_picture.py OUT.png``."""
+"""Three sections in their glands with the contact stress below: ``python tools/section_picture.py OUT.png``."""
 
 import sys
 from pathlib import Path
