@@ -90,6 +90,8 @@ def section_document(
 
 def _check_size(drawing: str, section: Section, height: float, gland: Gland) -> None:
     gap = 0.5 * (gland.gland - gland.rod)
+    if gap <= 0.0:
+        raise ValueError(f'{drawing}: the rod is not smaller than the gland')
     length = section.length * height / section.height
     if not gap < height < 2.0 * gap:
         raise ValueError(

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
+from paths import ROOT
 
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.oring_contact.section import SHAPES, placed
@@ -55,6 +57,7 @@ def test_a_shape_lies_in_the_middle_of_the_gap_and_a_drawing_where_it_is_drawn(t
         (GLAND, 'give the free height of the section, --height'),
         (GLAND._replace(height=4e-3), '4 mm high, the gap between rod and gland 5 mm'),
         (GLAND._replace(height=6e-3 * 25.4), 'is the unit right'),
+        (GLAND._replace(height=6e-3, gland=30e-3), 'the rod is not smaller than the gland'),
         (GLAND._replace(height=6e-3, groove=7e-3), '7.8 mm long, its groove 7 mm'),
     ],
 )
@@ -71,3 +74,16 @@ def test_what_is_neither_shape_nor_file_is_refused(capsys: pytest.CaptureFixture
 def test_numbers_that_depend_on_the_mesh_are_marked():
     assert 'friction within 2 % of the finest' in MeshLevels((23, 33, 46), ((1.0,),) * 3, 0.02).text()
     assert 'TOO MUCH, give more --lines' in MeshLevels((23, 33, 46), ((1.0,),) * 3, 0.04).text()
+
+
+def test_a_section_may_have_unknowns_and_its_samples_are_kept_by_its_outline(tmp_path: Path):
+    document = yaml.safe_load((ROOT / 'config' / 'oring' / 'delft_x_ring.yaml').read_text())
+    document |= {'unknown': {'rubber.hardness': {'tolerance': 5.0}}, 'numerics': {'lines': 13}, 'pressures': [0.0, 3e5]}
+    keys = []
+    for radius in (0.2, 0.22):
+        document['section'] = {'shape': 'x_ring', 'lobe_radius': radius}
+        path = tmp_path / f'{radius}.yaml'
+        path.write_text(yaml.safe_dump(document))
+        assert main(['oring', str(path), '--uncertain', '2', '--workers', '1', '--work', str(tmp_path / 'work')]) == 0
+        keys.append(len(list((tmp_path / 'work').rglob('*.json'))))
+    assert keys[1] > keys[0]
