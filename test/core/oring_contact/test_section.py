@@ -119,6 +119,18 @@ def test_a_mesh_fills_its_section_with_sound_elements(shape: str):
     assert signed_area(mesh.nodes[mesh.surface]) > 0.0
 
 
+def test_outlines_drawn_at_random_are_meshed():
+    random = np.random.default_rng(1)
+    for corners in range(4, 16):
+        angle = 2.0 * np.pi * (np.arange(corners) + random.uniform(0.0, 0.7, corners)) / corners
+        radius = random.uniform(0.35, 1.0, corners)
+        outline = np.stack((radius * np.cos(angle), radius * np.sin(angle)), axis=1)
+        section = placed(Section(checked_outline(outline, 'random')), 20e-3, 4e-3)
+        weights = make_elements(section_mesh(section, 0.15e-3)).weights
+        assert weights.sum() == pytest.approx(section.volume, rel=1e-3)
+        assert (weights.min(axis=1) / weights.max(axis=1)).min() > 0.2
+
+
 def test_half_the_edge_has_two_to_four_times_the_elements():
     section = placed(SHAPES['x_ring'](), 18.64e-3, 3.53e-3)
     coarse, fine = (len(section_mesh(section, edge).elements) for edge in (0.1e-3, 0.05e-3))
