@@ -27,6 +27,7 @@ setup(
         shared('config', '*.yaml'),
         shared('config', '*.xml'),
         shared('config/seals', '*.yaml'),
+        shared('config/seals/catalogue', '*.yaml'),
         shared('config/layouts', '*.json'),
         shared('config/layouts', '*.xml'),
         shared('config/machines', '*.yaml'),
@@ -71,7 +72,8 @@ setup(
             'cloudpickle==3.1.2',
             'pyarrow==26.0.1',
             'fsspec==2026.9.0',
-        ]
+        ],
+        'drawings': ['ezdxf==1.4.5'],  # DXF of a seal section
     },
     maintainer='seal_friction_ros maintainers',
     maintainer_email='maintainers@seal-friction.invalid',

@@ -168,6 +168,7 @@ PAGES_OF_COMMANDS = {
     'log': 'rig_files.md',
     'monitor': 'monitor.md',
     'oring': 'oring.md',
+    'section': 'seal_from_drawing.md',
     'policy': 'security.md',
     'recover': 'recording.md#recover',
     'replay': 'performance.md#replay',

@@ -23,6 +23,7 @@ from seal_friction_ros.offline.commands import (
     new,
     oring,
     seals,
+    section,
     topics,
     tune,
 )
@@ -38,7 +39,7 @@ GROUPS = {
     'identify': (identify, *of_studies('commands.spool'), seals),
     'watch': (monitor, topics, health),
     'tune': (tune,),
-    'compute': (oring, ehl),
+    'compute': (oring, section, ehl),
     'machine': (new, export, doctor),
 }
 
