@@ -39,6 +39,7 @@ test-lowest: setup
 
 bench: setup
 	@$(python) bench/step.py
+	@$(python) bench/loop.py
 	@$(python) bench/servo.py
 	@$(python) bench/oring.py --lines 17 25 33
 	@$(python) bench/ehl.py

@@ -27,6 +27,7 @@ setup(
         shared('config', '*.yaml'),
         shared('config', '*.xml'),
         shared('config/seals', '*.yaml'),
+        shared('config/seals/catalogue', '*.yaml'),
         shared('config/layouts', '*.json'),
         shared('config/layouts', '*.xml'),
         shared('config/machines', '*.yaml'),
@@ -43,6 +44,7 @@ setup(
     package_data={
         NAME: ['py.typed'],
         f'{NAME}.offline.reports': ['templates/*.html', 'templates/*.js'],
+        f'{NAME}.offline.export': ['templates/*'],
         f'{NAME}.offline.monitor': ['page/*'],
         STUDIES: ['py.typed'],
         f'{STUDIES}.offline': ['templates/*.html'],
@@ -70,7 +72,8 @@ setup(
             'cloudpickle==3.1.2',
             'pyarrow==26.0.1',
             'fsspec==2026.9.0',
-        ]
+        ],
+        'drawings': ['ezdxf==1.4.5'],  # DXF of a seal section
     },
     maintainer='seal_friction_ros maintainers',
     maintainer_email='maintainers@seal-friction.invalid',

@@ -20,11 +20,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from seal_friction_ros.compiled_code import keep_compiled_code
 from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
-from seal_friction_ros.core.estimation.pipeline import init, receive
+from seal_friction_ros.core.estimation.loop import LoopSample, receive_sample
+from seal_friction_ros.core.estimation.pipeline import Emit, init, receive
 from seal_friction_ros.core.friction.actuator import Seal
 from seal_friction_ros.core.friction.states import FrictionState
-from seal_friction_ros.core.messages import records
-from seal_friction_ros.core.messages.records import FeedForward, FrictionEstimate, Input, Output, ServoReference, Status
+from seal_friction_ros.core.messages.records import FeedForward, FrictionEstimate, Input, Output, Status
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, TuningSettings
 from seal_friction_ros.files import config_path
 from seal_friction_ros.offline.work.outcome import error_text
@@ -182,9 +182,13 @@ class Estimator:
             received: Time of receipt on a steady clock [ns]; None: the stamp.
             sent: When it was sent, on the same clock [ns]; None: when it was received.
         """
-        answers: list[Output] = []
         arrived = message.stamp if received is None else received
-        receive(self._parameters, self._state, message, arrived, lambda answer, _: answers.append(answer), sent)
+        return self._taken(lambda emit: receive(self._parameters, self._state, message, arrived, emit, sent))
+
+    def _taken(self, take: Callable[[Emit], None]) -> list[Output]:
+        """Answers that a call makes."""
+        answers: list[Output] = []
+        take(lambda answer, _: answers.append(answer))
         forces = [answer for answer in answers if isinstance(answer, FeedForward)]
         self.feedforward = forces[-1] if forces else self.feedforward
         return answers
@@ -218,17 +222,11 @@ class Estimator:
         """
         if not math.isfinite(time):
             raise ValueError(f'time = {time} s is not finite: give the time of the sample')
-        stamp = round(time * 1e9)
-        inputs: tuple[tuple[float, Input], ...] = (
-            (pressure_a, records.Pressure(stamp, float(pressure_a), float(pressure_b))),
-            (force_sum, records.Force(stamp, float(force_sum))),
-            (temperature, records.Temperature(stamp, float(temperature))),
-            (reference_velocity, ServoReference(stamp, 0.0, float(reference_velocity), float(reference_acceleration))),
-        )
-        for value, message in inputs:
-            if not math.isnan(value):
-                self.receive(message)
-        answers = self.receive(records.Velocity(stamp, float(velocity)))
+        sample = LoopSample(
+            round(time * 1e9), float(velocity), float(pressure_a), float(pressure_b), float(force_sum),
+            float(reference_velocity), float(reference_acceleration), float(temperature),
+        )  # fmt: skip
+        answers = self._taken(lambda emit: receive_sample(self._parameters, self._state, sample, emit))
         return next(answer for answer in answers if isinstance(answer, FrictionEstimate))
 
     def over(self, samples: Mapping[str, ArrayLike]) -> Columns:

@@ -21,6 +21,7 @@ OPTIONAL = {
     'distributed': '',
     'fsspec': '',
     'pyarrow': '',
+    'ezdxf': '',
     'pandas': 'python3-pandas',
     'xarray': 'python3-xarray',
 }

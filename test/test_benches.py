@@ -56,6 +56,12 @@ def test_the_start_is_timed():
     assert min(found.values()) > 0.0
 
 
+def test_a_step_of_a_loop_in_c_is_timed_beside_that_of_python():
+    found = run_json('bench/loop.py', '--steps', '5000')['step']
+    assert 0.0 < found['C, median [us]'] <= found['C, p99 [us]'] <= found['C, worst [us]']
+    assert found['ratio'] > 1.0
+
+
 def test_a_sample_is_timed_stage_by_stage():
     found = run_json('bench/step.py', '--batches', '1')
     assert {'bare call [us]', 'receive velocity [us]', 'receive velocity, with feed-forward [us]'} <= set(found)

@@ -36,7 +36,7 @@ ROOMS = {  # in order; rooms on one line do not import from each other
         ('work',),
         ('bags',),
         ('replay',),
-        ('identification', 'tuning', 'contact', 'monitor'),
+        ('identification', 'tuning', 'contact', 'monitor', 'export'),
         ('reports',),
         ('commands',),
     ),

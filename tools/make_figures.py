@@ -9,6 +9,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 from monitor_picture import draw_monitor
+from section_picture import draw_sections
 
 from seal_friction_ros.files import config_path
 from seal_friction_ros.offline.bags.import_thesis import import_thesis
@@ -99,6 +100,7 @@ def main() -> int:
     FIGURES.mkdir(parents=True, exist_ok=True)
     draw_architecture(FIGURES / 'architecture.png')
     draw_monitor(FIGURES / 'monitor.png')
+    draw_sections(FIGURES / 'seal_sections.png')
     rings = Path(__file__).parents[1] / 'test' / 'system' / 'oring_map.py'
     subprocess.run([sys.executable, str(rings), '--figure', str(FIGURES / 'ehl_oring.png')], check=True)
     with tempfile.TemporaryDirectory() as name:

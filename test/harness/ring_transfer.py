@@ -12,7 +12,6 @@ from scipy.signal import savgol_filter
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.units import BAR
-from seal_friction_ros.core.oring_contact.oring_case import OringNumerics
 from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
 from seal_friction_ros.core.oring_contact.results import WallContact, oring_results
 from seal_friction_ros.core.oring_contact.ring_friction import (
@@ -57,7 +56,7 @@ class Ring(NamedTuple):
 def ring_of(case: str, lines: int) -> Ring:
     """A case of the package with its own readings, on a mesh of ``lines``."""
     file = parse_oring_case(read_yaml(config_path('oring', case)))
-    coarse = dataclasses.replace(file.case, numerics=OringNumerics(lines=lines))
+    coarse = dataclasses.replace(file.case, numerics=dataclasses.replace(file.case.numerics, lines=lines))
     results = list(oring_results(coarse, file.pressures))
     measured = file.measured
     assert measured is not None

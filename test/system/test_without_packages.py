@@ -74,6 +74,7 @@ def test_replay_compare_and_info_need_numpy_yaml_and_mcap_alone(tmp_path: Path):
         ('distributed', ['replay', PULL_TEST, '--scheduler', 'tcp://127.0.0.1:1']),
         ('fsspec', ['replay', 'memory://a/bag']),
         ('pyarrow', ['fleet', 'bags', '--out', '{}.html', '--parquet', '{}.parquet']),
+        ('ezdxf', ['section', 'seal.dxf', '--rod', '36mm', '--gland', '46mm', '--pressure', '50bar']),
     ],
 )
 def test_a_command_that_lacks_a_package_says_which_and_how_to_install_it(package, arguments, tmp_path: Path):

@@ -14,6 +14,7 @@ from numba import literal_unroll
 from numba.extending import overload
 
 from seal_friction_ros.core.estimation.pipeline import (
+    LATEST,
     PipelineParameters,
     PipelineState,
     acting_since,
@@ -59,8 +60,6 @@ from seal_friction_ros.core.messages.records import (
     WatchdogTick,
     numbers_in,
 )
-
-LATEST = 1 << 61  # [ns] stamps up to here, as messages have them: differences fit into 64 bits
 
 _FORCE, _PRESSURE, _REFERENCE = int(Kind.FORCE), int(Kind.PRESSURE), int(Kind.REFERENCE)
 _TEMPERATURE, _TICK, _VELOCITY = int(Kind.TEMPERATURE), int(Kind.TICK), int(Kind.VELOCITY)

@@ -82,6 +82,7 @@ from seal_friction_ros.core.messages.records import (
 
 ACCELERATION_SMOOTHING = 4.0  # [-] of the time constant of the velocity; our choice
 ZERO_CELSIUS = ZEROS['degC']  # [K]
+LATEST = 1 << 61  # [ns] compiled code takes times up to here: their differences fit into 64 bits
 TICK_INTERVAL = 9_000_000  # [ns] the watchdog acts if no feed-forward was made for this time
 
 Emit = Callable[[Output, bytes], object]

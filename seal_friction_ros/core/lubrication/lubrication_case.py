@@ -176,7 +176,10 @@ def _oring(
     unused += [f'seal.{key}' for key in document.get('seal') or () if key != 'solid_shear_stress']
     if unused:
         raise ValueError(f'{where}: {", ".join(unused)} has no meaning for an O-ring: leave it out')
-    return load_oring(document['oring'])
+    file = load_oring(document['oring'])
+    if file.case.section is not None:
+        raise ValueError(f'{where}: the film is computed for round rings: {file.case.name} has another section')
+    return file
 
 
 # -- what is not known ------------------------------------------------------------------------------------------------

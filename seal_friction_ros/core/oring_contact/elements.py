@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
-from seal_friction_ros.core.oring_contact.material import Rubber, shear_response, volume_response
+from seal_friction_ros.core.oring_contact.material import Rubber, RubberField, shear_response, volume_response
 from seal_friction_ros.core.oring_contact.mesh import Mesh
 
 _CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -71,7 +71,7 @@ def is_inside_out(gradient: FloatArray) -> bool:
 
 
 def element_forces(
-    elements: Elements, rubber: Rubber, gradient: FloatArray, tension: FloatArray | None = None
+    elements: Elements, rubber: Rubber | RubberField, gradient: FloatArray, tension: FloatArray | None = None
 ) -> ElementForces:
     """Internal force and stiffness of every element at a deformation gradient of shape (e, 4, 5).
 
@@ -83,7 +83,8 @@ def element_forces(
     weights, rows = elements.weights, elements.gradient_rows
     count = len(rows)
     total = weights.sum(axis=1)
-    true_tension: FloatArray = rubber.bulk_modulus * ((weights * volume.energy).sum(axis=1) / total - 1.0)
+    bulk = np.ravel(rubber.bulk_modulus)  # of all elements, or of each
+    true_tension: FloatArray = bulk * ((weights * volume.energy).sum(axis=1) / total - 1.0)
     assumed = true_tension if tension is None else tension
     flat = rows.reshape(count, 20, 8)
     transposed = np.swapaxes(flat, 1, 2)
@@ -92,7 +93,7 @@ def element_forces(
     force += true_tension[:, None] * growth
     stiffness = weights[..., None, None] * (shear.stiffness + assumed[:, None, None, None] * volume.stiffness)
     matrix = transposed @ (stiffness @ rows).reshape(count, 20, 8)
-    tension_rows = (rubber.bulk_modulus / total)[:, None] * growth
+    tension_rows = (bulk / total)[:, None] * growth
     matrix += growth[:, :, None] * tension_rows[:, None, :]
     return ElementForces(force, matrix, true_tension, tension_rows)
 

@@ -15,7 +15,7 @@ from seal_friction_ros.core.oring_contact.elements import (
     is_inside_out,
     make_elements,
 )
-from seal_friction_ros.core.oring_contact.material import Rubber
+from seal_friction_ros.core.oring_contact.material import Rubber, RubberField
 from seal_friction_ros.core.oring_contact.mesh import Mesh
 from seal_friction_ros.core.oring_contact.surroundings import Surroundings, outline_freedoms, surface_forces
 
@@ -26,11 +26,11 @@ _PIVOT = 0.01  # diagonal entry over the largest of its column, above which it i
 
 
 class OringModel(NamedTuple):
-    """Meshed ring of one material."""
+    """Meshed ring of one rubber, or of one for each element."""
 
     mesh: Mesh
     elements: Elements
-    rubber: Rubber
+    rubber: Rubber | RubberField
     force_scale: float  # 2 pi R E d, R the radius of the ring [N]: reference of the residual forces
     guide: tuple[int, int]  # inner and outer node of the guide against rolling
     guide_stiffness: float  # force over difference of their axial displacements [N/m]
@@ -62,20 +62,22 @@ class ForceBalance(NamedTuple):
     tension_rows: FloatArray  # [Pa/m], shape (e, 8)
 
 
-def make_model(mesh: Mesh, rubber: Rubber, section_diameter: float, guide: float) -> OringModel:
+def make_model(
+    mesh: Mesh, rubber: Rubber, section_diameter: float, guide: float, field: RubberField | None = None
+) -> OringModel:
     """Model of a meshed ring of ``section_diameter`` d [m].
 
     Between frictionless walls a round ring rolls almost freely: only its hoop strain resists, and the facets of the
     mesh make the motion jump. The guide, a couple without net force, keeps the two nodes halfway to rod and gland at
     the same axial position (our choice; docs/oring.md has its influence). Its stiffness ``guide`` is that over 2 pi R
-    E, R the radius of the ring.
+    E, R the radius of the ring. With a ``field`` each element has its own rubber, and ``rubber`` gives the scales.
     """
     center = mesh.nodes.mean(axis=0)
     quarter = np.array([section_diameter / 4.0, 0.0])
     inner, outer = (int(np.argmin(np.linalg.norm(mesh.nodes - center - side * quarter, axis=1))) for side in (-1, 1))
     per_length = float(2.0 * np.pi * center[0] * rubber.elastic_modulus)
     return OringModel(
-        mesh, make_elements(mesh), rubber, per_length * section_diameter, (inner, outer), guide * per_length
+        mesh, make_elements(mesh), field or rubber, per_length * section_diameter, (inner, outer), guide * per_length
     )
 
 

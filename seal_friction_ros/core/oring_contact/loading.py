@@ -21,11 +21,15 @@ from seal_friction_ros.core.oring_contact.equilibrium import (
     solve_equilibrium,
     unstressed_state,
 )
+from seal_friction_ros.core.oring_contact.material import rubber_field
 from seal_friction_ros.core.oring_contact.mesh import o_grid
 from seal_friction_ros.core.oring_contact.oring_case import OringCase, check_pressures
+from seal_friction_ros.core.oring_contact.section import first_crossing, placed
+from seal_friction_ros.core.oring_contact.section_mesh import inside, section_mesh
 from seal_friction_ros.core.oring_contact.surroundings import (
     GLAND,
     ROD,
+    WALL,
     Surroundings,
     node_areas,
     surface_pressure,
@@ -36,6 +40,7 @@ _SOFTER = 100.0  # factor by which the penalty is reduced during squeezing
 _SQUEEZE_STRIDE, _STIFFEN_STRIDE, _FRICTION_STRIDE = 1.0, 0.5, 0.1  # first steps, as fractions of their paths
 _DRY = 0.1  # transition without fluid over transition with fluid
 _SEATING = 1e-3  # first penetration of the ring into the downstream wall, over d
+_FLAT_SEATING = 0.02  # first stress of another section, which may be flat there, on that wall over E
 
 
 class LoadedRing(NamedTuple):
@@ -50,6 +55,14 @@ class LoadedRing(NamedTuple):
 def oring_model(case: OringCase) -> OringModel:
     """Model of a case."""
     geometry, numerics = case.geometry, case.numerics
+    if case.section is not None:
+        section = placed(case.section, geometry.ring_inner_diameter, geometry.section_diameter)
+        mesh = section_mesh(section, 0.25 * math.pi * geometry.section_diameter / (numerics.lines - 1))
+        field = None
+        if section.cap is not None:
+            in_cap = inside(mesh.nodes[mesh.elements].mean(axis=1), section.cap)
+            field = rubber_field((case.rubber, case.cap or case.rubber), in_cap.astype(int))
+        return make_model(mesh, case.rubber, geometry.section_diameter, 0.0, field)
     center = (geometry.ring_inner_diameter + geometry.section_diameter) / 2.0
     mesh = o_grid(geometry.section_diameter, center, numerics.lines)
     return make_model(mesh, case.rubber, geometry.section_diameter, numerics.guide)
@@ -76,6 +89,7 @@ def loaded_states(case: OringCase, model: OringModel, pressures: tuple[float, ..
         now, next_rise = _raise_pressure(case, model, free, base, pressure, rise)
         loaded = _apply_wall_friction(case, model, free, now)
         _check_sealed(case, model, loaded)
+        _check_unfolded(case, model, loaded)
         yield loaded
         if pressure > lowest:  # at lower pressure the wall hardly supports the ring: a poor start for the next step
             base, rise = now, next_rise
@@ -106,7 +120,8 @@ def squeeze_ring(case: OringCase, model: OringModel) -> LoadedRing:
         return walls._replace(penalty=walls.penalty * _SOFTER ** (share - 1.0))
 
     with _named(case, 'of the squeezed ring'):
-        closed = follow_path(model, assembly, closing, unstressed_state(model), _SQUEEZE_STRIDE, stretched)
+        guess = stretched if case.section is None else None
+        closed = follow_path(model, assembly, closing, unstressed_state(model), _SQUEEZE_STRIDE, guess)
         reached = follow_path(model, assembly, stiffening, closed.state, _STIFFEN_STRIDE)
     length = float(np.ptp(outline(model, reached.state)[:, 1]))
     if length >= case.groove.width:
@@ -124,16 +139,18 @@ def seat_ring(case: OringCase, model: OringModel, free: Assembly, squeezed: Load
     stays fixed while the wall takes load; it is then released under the pressure that balances the wall force.
     NotConvergedError: Newton's method did not converge.
     """
+    seating = _SEATING if case.section is None else _FLAT_SEATING / case.numerics.penalty
     top = float(outline(model, squeezed.state)[:, 1].max())
     wall = squeezed.surroundings._replace(
-        wall_position=top - _SEATING * case.geometry.section_diameter,
+        wall_position=top - seating * case.geometry.section_diameter,
         transition=case.numerics.transition * case.rubber.elastic_modulus,
     )
     with _named(case, 'of the ring on the downstream wall'):
         state, steps = solve_equilibrium(model, make_assembly(model, _fixed(model)), wall, squeezed.state)
         position = outline(model, state)
-        axial = surface_pressure(wall, position).total * node_areas(position)[:, 1]
-        pressure = float(axial[position[:, 1] > 0.0].sum()) / projected_area(case.geometry)
+        stress = surface_pressure(wall, position)
+        axial = stress.total * stress.shares[:, 1 + WALL] * node_areas(position)[:, 1]
+        pressure = float(axial.sum()) / projected_area(case.geometry)
         surroundings = wall._replace(pressure=pressure, wetted=wetted_nodes(wall, position))
         state, more = solve_equilibrium(model, free, surroundings, state)
     return LoadedRing(pressure, surroundings, state, squeezed.newton_steps + steps + more)
@@ -144,11 +161,27 @@ def _named(case: OringCase, which: str) -> AbstractContextManager[None]:
 
 
 def wetted_nodes(surroundings: Surroundings, position: FloatArray) -> BoolArray:
-    """Whether each node of the outline is upstream of the peak contact stresses on rod and gland, shape (s,)."""
+    """Whether each node of the outline is upstream of the lips on rod and gland that hold the fluid, shape (s,)."""
     stresses = wall_stresses(surroundings, position)
-    rod, gland = int(np.argmax(stresses[:, ROD])), int(np.argmax(stresses[:, GLAND]))
+    away = np.where(stresses.max(axis=1) < 0.0, position[:, 1], np.inf)
+    start = int(np.argmin(away))
+    rod = _holding(stresses[:, ROD], surroundings.pressure, start, -1)
+    gland = _holding(stresses[:, GLAND], surroundings.pressure, start, 1)
     wetted: BoolArray = (np.arange(len(position)) - rod) % len(position) <= (gland - rod) % len(position)
     return wetted
+
+
+def _holding(stress: FloatArray, pressure: float, start: int, direction: int) -> int:
+    """Node with the peak stress of the first lip, from ``start`` on, that is above the pressure; else the highest one.
+
+    The fluid passes a lip whose peak stress is below its pressure; a lip ends where the stress has fallen to half of
+    its peak (our choice).
+    """
+    order = (start + direction * np.arange(len(stress))) % len(stress)
+    along = stress[order]
+    peak = np.maximum.accumulate(along)
+    behind = np.flatnonzero((peak > max(pressure, 0.0)) & (along < 0.5 * peak))
+    return int(order[np.argmax(along[: behind[0]] if len(behind) else along)])
 
 
 def _fixed(model: OringModel) -> tuple[int]:
@@ -162,8 +195,8 @@ def _raise_pressure(
     """Ring under the pressure ``target`` [Pa], and the pressure rise [Pa] to try in the next step."""
 
     def rising(share: float, state: OringState) -> Surroundings:
-        wetted = wetted_nodes(now.surroundings, outline(model, state))
-        return now.surroundings._replace(pressure=now.pressure + share * (target - now.pressure), wetted=wetted)
+        risen = now.surroundings._replace(pressure=now.pressure + share * (target - now.pressure))
+        return risen._replace(wetted=wetted_nodes(risen, outline(model, state)))
 
     total_rise = abs(target - now.pressure)
     with _named(case, f'between {now.pressure:.6g} and {target:.6g} Pa'):
@@ -195,6 +228,17 @@ def _check_sealed(case: OringCase, model: OringModel, now: LoadedRing) -> None:
             )
 
 
+def _check_unfolded(case: OringCase, model: OringModel, now: LoadedRing) -> None:
+    """A section whose outline crosses itself would touch itself, a contact that is not computed."""
+    crossing = None if case.section is None else first_crossing(outline(model, now.state))
+    if crossing is not None:
+        r, z = crossing
+        raise ValueError(
+            f'case {case.name}: at {now.pressure:.6g} Pa the section folds onto itself at r = {r:.6g} m, '
+            f'z = {z:.6g} m: contact of a seal with itself is not computed'
+        )
+
+
 def _dry_walls(case: OringCase, model: OringModel) -> Surroundings:
     """Rod and gland at their final radii, no fluid, no downstream wall."""
     geometry, elastic_modulus = case.geometry, case.rubber.elastic_modulus
@@ -206,6 +250,7 @@ def _dry_walls(case: OringCase, model: OringModel) -> Surroundings:
         wetted=np.zeros(len(model.mesh.surface), dtype=bool),
         penalty=case.numerics.penalty * elastic_modulus / geometry.section_diameter,
         transition=_DRY * case.numerics.transition * elastic_modulus,
+        faces_walls=case.section is not None,
     )
 
 

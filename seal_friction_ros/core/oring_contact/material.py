@@ -7,17 +7,20 @@ With the deformation gradient
 
 the shear energy per reference volume is independent of volume change through its powers of J [Simo1985]_:
 
-.. math:: W = C_{10} (J^{-2/3} I_1 - 3) + C_{01} (J^{-4/3} I_2 - 3)
+.. math:: W = \sum_{k=1}^3 C_{k0} (J^{-2/3} I_1 - 3)^k + C_{01} (J^{-4/3} I_2 - 3)
 
-It is a sum of monomials in T, D and t, so its derivatives need no tensor algebra.
+with :math:`C_{20} = C_{30} = 0` the rubber of Mooney and Rivlin, with :math:`C_{01} = 0` that of Yeoh [Yeoh1993]_. Both
+invariants are sums of monomials in T, D and t, so their derivatives need no tensor algebra.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
-from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 
 
@@ -29,6 +32,8 @@ class Rubber(CheckedParameters):
         unit='Pa', lower=1e4, upper=1e10, description="Young's modulus at small strain, E."
     )
     mooney_ratio: float = parameter(0.25, unit='1', lower=0.0, upper=10.0, description='C01 / C10; 0: neo-Hookean.')
+    yeoh_second: float = parameter(0.0, unit='1', lower=-0.5, upper=10.0, description='C20 / C10 of Yeoh.')
+    yeoh_third: float = parameter(0.0, unit='1', lower=0.0, upper=10.0, description='C30 / C10 of Yeoh.')
     bulk_modulus: float = parameter(
         2.0e9, unit='Pa', lower=1e6, upper=1e12, description='Bulk modulus, K; about 2 GPa for rubber.'
     )
@@ -42,7 +47,22 @@ class Rubber(CheckedParameters):
             )
 
 
-def mooney_rivlin_constants(rubber: Rubber) -> tuple[float, float]:
+class RubberField(NamedTuple):
+    """Constants of `Rubber`, one for each element, shape (e, 1)."""
+
+    elastic_modulus: FloatArray
+    mooney_ratio: FloatArray
+    yeoh_second: FloatArray
+    yeoh_third: FloatArray
+    bulk_modulus: FloatArray
+
+
+def rubber_field(rubbers: Sequence[Rubber], which: IntArray) -> RubberField:
+    """Constants of elements that are made of the rubbers number ``which``, shape (e,)."""
+    return RubberField(*(np.array([getattr(r, name) for r in rubbers])[which, None] for name in RubberField._fields))
+
+
+def mooney_rivlin_constants(rubber: Rubber | RubberField) -> tuple[Any, Any]:
     """C10 and C01 [Pa]: 2 (C10 + C01) is the shear modulus, E / 3 for an incompressible rubber.
 
     Source: [Rivlin1951]_.
@@ -72,6 +92,46 @@ def hardness_of_elastic_modulus(elastic_modulus: float) -> float:
     return (254.0 * ratio - 56.0) / (7.62336 + 2.54 * ratio)
 
 
+def rubber_of_tension(stretch: FloatArray, stress: FloatArray, model: str = 'yeoh') -> Rubber:
+    r"""Rubber of a uniaxial test, by least squares: stretches and nominal stresses [Pa], shape (n,) each.
+
+    .. math:: P = 2 (\lambda - \lambda^{-2}) (dW/dI_1 + C_{01} / \lambda), \quad I_1 = \lambda^2 + 2 / \lambda
+
+    ``model`` is one of `TEST_MODELS`. No constant but C20 is below 0. ValueError: fewer than four points, or a curve
+    that no such rubber has.
+
+    Source: [Rivlin1951]_, [Yeoh1993]_.
+    """
+    if model not in TEST_MODELS:
+        raise ValueError(f'model {model!r} is none of {", ".join(TEST_MODELS)}')
+    away = np.abs(stretch - 1.0) > 1e-6
+    stretch, stress = stretch[away], stress[away]
+    if len(stretch) < 4 or not (stretch > 0.0).all():
+        raise ValueError('a test curve needs four points or more off the unloaded state, of a stretch above 0')
+    a = stretch**2 + 2.0 / stretch - 3.0
+    base = 2.0 * (stretch - stretch**-2)
+    columns = {'c10': base, 'c01': base / stretch, 'c20': 2.0 * a * base, 'c30': 3.0 * a**2 * base}
+    names = TEST_MODELS[model]
+    lower = [-np.inf if name == 'c20' else 0.0 for name in names]
+    matrix = np.stack([columns[name] for name in names], axis=1)
+    size = np.abs(matrix).max(axis=0)
+    found = lsq_linear(matrix / size, stress, (lower, np.inf)).x / size
+    constants = dict.fromkeys(columns, 0.0) | dict(zip(names, found.tolist(), strict=True))
+    if not constants['c10'] > 1e3:
+        raise ValueError(f'the test curve is not that of a rubber of {model}: C10 = {constants["c10"]:.3g} Pa')
+    c10 = constants['c10']
+    return Rubber(
+        elastic_modulus=6.0 * (c10 + constants['c01']),
+        mooney_ratio=constants['c01'] / c10,
+        yeoh_second=constants['c20'] / c10,
+        yeoh_third=constants['c30'] / c10,
+    )
+
+
+TEST_MODELS = {'mooney': ('c10', 'c01'), 'yeoh': ('c10', 'c20', 'c30')}
+"""Model of a rubber -> its constants; that of Mooney and Rivlin is Ogden's with exponents 2 and -2."""
+
+
 class MaterialResponse(NamedTuple):
     """An energy density W(F) with its derivatives by F, at points; components in the order rr, rz, zr, zz, t."""
 
@@ -83,7 +143,7 @@ class MaterialResponse(NamedTuple):
 _DETERMINANT_HESSIAN = np.array([[0, 0, 0, 1], [0, 0, -1, 0], [0, -1, 0, 0], [1, 0, 0, 0]], dtype=float)
 
 
-def shear_response(rubber: Rubber, gradient: FloatArray) -> MaterialResponse:
+def shear_response(rubber: Rubber | RubberField, gradient: FloatArray) -> MaterialResponse:
     """Shear energy density with its derivatives, for a deformation gradient of shape (..., 5) with D > 0 and t > 0."""
     c10, c01 = mooney_rivlin_constants(rubber)
     plane = gradient[..., :4]
@@ -92,6 +152,9 @@ def shear_response(rubber: Rubber, gradient: FloatArray) -> MaterialResponse:
     squares = (plane**2).sum(axis=-1)
     cofactor = _cofactor(plane)
     area = 0.5 * (plane * cofactor).sum(axis=-1)
+    yeoh = _yeoh(rubber, c10, squares, area, hoop)
+    if yeoh is not None:
+        c10 = yeoh.slope
     # W = sum of factor T^k D^m t^n, k = 0 or 1
     monomials = ((c10, 1, -2 / 3, -2 / 3), (c10, 0, -2 / 3, 4 / 3), (c01, 0, 2 / 3, -4 / 3), (c01, 1, -4 / 3, 2 / 3))
     w, w_T, w_D, w_t, w_TD, w_Tt, w_DD, w_Dt, w_tt = (np.zeros_like(hoop) for _ in range(9))
@@ -122,7 +185,42 @@ def shear_response(rubber: Rubber, gradient: FloatArray) -> MaterialResponse:
     stiffness[..., :4, 4] = mixed
     stiffness[..., 4, :4] = mixed
     stiffness[..., 4, 4] = w_tt
-    return MaterialResponse(w - 3.0 * (c10 + c01), stress, stiffness)
+    energy = w - 3.0 * (c10 + c01)
+    if yeoh is not None:
+        energy += yeoh.energy
+        change = np.concatenate(
+            (2.0 * yeoh.by_squares[..., None] * plane + yeoh.by_area[..., None] * cofactor, yeoh.by_hoop[..., None]),
+            axis=-1,
+        )
+        stiffness += yeoh.curvature[..., None, None] * change[..., :, None] * change[..., None, :]
+    return MaterialResponse(energy, stress, stiffness)
+
+
+class _Yeoh(NamedTuple):
+    """What the higher powers of a = J^(-2/3) I_1 - 3 add, shape (...)."""
+
+    slope: FloatArray  # dW/da [Pa]
+    energy: FloatArray  # W less a dW/da [Pa]
+    curvature: FloatArray  # d2W/da2 [Pa]
+    by_squares: FloatArray
+    by_area: FloatArray
+    by_hoop: FloatArray  # derivatives of a
+
+
+def _yeoh(
+    rubber: Rubber | RubberField, c10: Any, squares: FloatArray, area: FloatArray, hoop: FloatArray
+) -> _Yeoh | None:
+    """None for a rubber of Mooney and Rivlin."""
+    second, third = rubber.yeoh_second, rubber.yeoh_third
+    if not (np.any(second) or np.any(third)):
+        return None
+    by_squares = (area * hoop) ** (-2.0 / 3.0)
+    first = by_squares * (squares + hoop**2)
+    a = first - 3.0
+    slope = c10 * (1.0 + 2.0 * second * a + 3.0 * third * a**2)
+    energy = c10 * (a + second * a**2 + third * a**3) - slope * a
+    by_hoop = by_squares * (4.0 / 3.0 * hoop - 2.0 / 3.0 * squares / hoop)
+    return _Yeoh(slope, energy, c10 * (2.0 * second + 6.0 * third * a), by_squares, -2.0 / 3.0 * first / area, by_hoop)
 
 
 def volume_response(gradient: FloatArray) -> MaterialResponse:
@@ -144,7 +242,7 @@ def _cofactor(plane: FloatArray) -> FloatArray:
     return cofactor
 
 
-def von_mises_stress(rubber: Rubber, gradient: FloatArray) -> FloatArray:
+def von_mises_stress(rubber: Rubber | RubberField, gradient: FloatArray) -> FloatArray:
     """Von Mises stress [Pa], shape (...), of the Cauchy stress P F^T / J; independent of the bulk modulus."""
     piola = shear_response(rubber, gradient).stress
     plane = gradient[..., :4].reshape(*gradient.shape[:-1], 2, 2)

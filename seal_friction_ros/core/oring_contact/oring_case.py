@@ -1,13 +1,14 @@
 """Input of the computation: ring, gland, rubber and discretisation."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.friction.geometry import SealGeometry, stretch
 from seal_friction_ros.core.oring_contact.extrusion import extrusion_pressure
 from seal_friction_ros.core.oring_contact.material import Rubber
+from seal_friction_ros.core.oring_contact.section import Section, placed
 
 
 @dataclass(frozen=True)
@@ -75,18 +76,20 @@ class OringCase(CheckedParameters):
         upper=0.1,
         description='Axial traction of rod and gland on the ring, over contact stress.',
     )
+    section: Section | None = field(default=None, compare=False)  # None: round; scaled to the height of the geometry
+    cap: Rubber | None = None  # material of the cap of the section
 
     def __post_init__(self) -> None:
         super().__post_init__()
         gap = (self.geometry.gland_diameter - self.geometry.rod_diameter) / 2.0
         section = stretched_section_diameter(self.geometry)
-        if section <= gap:
+        if self.section is None and section <= gap:
             raise ValueError(
                 f'OringCase.geometry: no squeeze: stretched over the rod, section_diameter = '
                 f'{self.geometry.section_diameter} m becomes {section:.6g} m and the gap between rod and gland is '
                 f'{gap:.6g} m'
             )
-        fill = gland_fill(self.geometry, self.groove)
+        fill = gland_fill(self.geometry, self.groove, self.section)
         if fill >= 1.0:
             raise ValueError(
                 f'OringCase.groove: overfilled gland: the rubber has {100.0 * fill:.1f} % of its volume; widen '
@@ -109,10 +112,13 @@ def stretched_section_diameter(geometry: SealGeometry) -> float:
     return section
 
 
-def gland_fill(geometry: SealGeometry, groove: Groove) -> float:
-    """Volume of the ring over volume of the gland [-]."""
+def gland_fill(geometry: SealGeometry, groove: Groove, section: Section | None = None) -> float:
+    """Volume of the ring, round or of a ``section``, over volume of the gland [-]."""
     d = geometry.section_diameter
-    ring = math.pi**2 / 4.0 * d**2 * (geometry.ring_inner_diameter + d)
+    if section is None:
+        ring = math.pi**2 / 4.0 * d**2 * (geometry.ring_inner_diameter + d)
+    else:
+        ring = placed(section, geometry.ring_inner_diameter, d).volume
     gland = math.pi / 4.0 * (geometry.gland_diameter**2 - geometry.rod_diameter**2) * groove.width
     return ring / gland
 

@@ -5,6 +5,7 @@ Example; docs/oring.md describes every field::
     name: ms28775_114
     source: origin of the numbers
     geometry: {section_diameter: 2.62e-3, ring_inner_diameter: 15.54e-3, rod_diameter: ..., gland_diameter: ...}
+    section: {shape: x_ring}            # optional: round without it; or outline: [[r, z], ...] [m]
     groove: {width: 3.6e-3, diametral_clearance: 0.1e-3}
     rubber: {hardness: 70.0}            # or elastic_modulus [Pa]; mooney_ratio, bulk_modulus
     pressures: [0.0, 3.4e+6, 6.9e+6]    # [Pa, gauge]
@@ -20,6 +21,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
+
+import numpy as np
 
 from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.foundation.parameters import (
@@ -39,10 +42,15 @@ from seal_friction_ros.core.friction.seal_file import parse_part
 from seal_friction_ros.core.oring_contact.material import Rubber, elastic_modulus_of_hardness
 from seal_friction_ros.core.oring_contact.oring_case import Groove, OringCase, OringNumerics, check_pressures
 from seal_friction_ros.core.oring_contact.ring_friction import RingLaw, SealFriction
+from seal_friction_ros.core.oring_contact.section import Section, checked_outline, mirrored, section_of_shape
+
+SECTION_TRANSITION = 0.01
+"""`OringNumerics.transition` of other sections than round ones: the stress of a lip is low, so it has to be sharp."""
+PTFE_MODULUS = 500.0e6  # [Pa] of PTFE at room temperature, 400 to 600 MPa (our choice)
 
 _KEYS = (
-    'name', 'source', 'geometry', 'groove', 'rubber', 'wall_friction', 'numerics', 'pressures', 'friction', 'measured',
-    'unknown',
+    'name', 'source', 'geometry', 'section', 'groove', 'rubber', 'cap', 'wall_friction', 'numerics', 'pressures',
+    'friction', 'measured', 'unknown',
 )  # fmt: skip
 
 
@@ -100,6 +108,8 @@ def parse_oring_case(document: Any) -> OringCaseFile:
     geometry = from_mapping(
         SealGeometry, document.get('geometry'), f'{where}: geometry', elastic_modulus=rubber.elastic_modulus
     )
+    section = _section(document['section'], f'{where}: section') if 'section' in document else None
+    standard = {} if section is None else {'transition': SECTION_TRANSITION}
     case = from_mapping(
         OringCase,
         {'wall_friction': document['wall_friction']} if 'wall_friction' in document else {},
@@ -108,7 +118,9 @@ def parse_oring_case(document: Any) -> OringCaseFile:
         geometry=geometry,
         groove=from_mapping(Groove, document.get('groove'), f'{where}: groove'),
         rubber=rubber,
-        numerics=from_mapping(OringNumerics, document.get('numerics', {}), f'{where}: numerics'),
+        section=section,
+        cap=_cap(document.get('cap'), section, f'{where}: cap'),
+        numerics=from_mapping(OringNumerics, standard | document.get('numerics', {}), f'{where}: numerics'),
     )
     pressures = from_mapping(_Pressures, {'pressures': document.get('pressures')}, where).pressures
     check_pressures(case, pressures)
@@ -118,6 +130,31 @@ def parse_oring_case(document: Any) -> OringCaseFile:
     if measured is not None:
         measured = from_mapping(MeasuredFriction, measured, f'{where}: measured')
     return OringCaseFile(case, pressures, source, friction, measured, unknown)
+
+
+def _section(values: Any, where: str) -> Section:
+    """Section of a shape with its proportions, or of an outline, which a piston has mirrored."""
+    if not isinstance(values, Mapping) or ('shape' in values) == ('outline' in values):
+        raise ValueError(f'{where}: give one of shape and outline; got {values!r}')
+    others = {key: value for key, value in values.items() if key not in ('shape', 'outline', 'mirrored')}
+    with named_errors(where):
+        if 'shape' in values:
+            section = section_of_shape(values['shape'], others)
+        else:
+            check_names(others, (), where)
+            section = Section(checked_outline(np.array(values['outline'], dtype=float), 'outline'))
+    return mirrored(section) if values.get('mirrored') else section
+
+
+def _cap(values: Any, section: Section | None, where: str) -> Rubber | None:
+    """Material of the cap; by default PTFE."""
+    if section is None or section.cap is None:
+        if values is not None:
+            raise ValueError(f'{where}: the section has no cap')
+        return None
+    modulus = from_mapping(_Cap, {} if values is None else values, where).elastic_modulus
+    with named_errors(where):
+        return Rubber(elastic_modulus=modulus, bulk_modulus=20.0 * modulus)  # the smallest: nearly incompressible
 
 
 def _rubber(values: Any, where: str) -> Rubber:
@@ -130,6 +167,11 @@ def _rubber(values: Any, where: str) -> Rubber:
         with named_errors(where):
             others['elastic_modulus'] = elastic_modulus_of_hardness(hardness)
     return from_mapping(Rubber, others, where)
+
+
+@dataclass(frozen=True)
+class _Cap:
+    elastic_modulus: float = PTFE_MODULUS
 
 
 @dataclass(frozen=True)

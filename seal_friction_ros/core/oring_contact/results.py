@@ -20,20 +20,21 @@ _TOUCHING = 20.0  # distance from a wall, in transitions, beyond which the conta
 class WallContact(NamedTuple):
     """Contact on one wall; position is z, positive downstream, on rod and gland, and r on the downstream wall."""
 
-    position: FloatArray  # of the nodes in contact [m], increasing, shape (k,)
-    stress: FloatArray  # contact stress [Pa], shape (k,)
+    position: FloatArray  # of the nodes in contact, and of the edges between two lips [m], increasing, shape (k,)
+    stress: FloatArray  # contact stress, 0 at those edges [Pa], shape (k,)
     force: float  # contact stress, what the wall bears beyond the share of the fluid, over the circumference [N]
     wall_force: float
     """all stress of the wall where it is above the pressure of the fluid, over the circumference: the usual definition,
     which a sharp transition between fluid and contact gives [N]"""
     peak_stress: float  # [Pa]
-    edges: tuple[float, float]  # begin and end of the contact [m]; equal without contact
+    edges: tuple[float, float]  # begin and end of the contact, of all lips [m]; equal without contact
     circumference: float = 0.0  # of the wall at the contact [m]
+    between_lips: float = 0.0  # width inside the edges that does not touch [m]
 
     @property
     def width(self) -> float:
         """Contact width [m]."""
-        return self.edges[1] - self.edges[0]
+        return self.edges[1] - self.edges[0] - self.between_lips
 
     def sheared_area(self, exponent: float) -> float:
         r"""Area of the contact weighted by its stress [m^2]: :math:`A_n = \int (\sigma / 1\,\mathrm{MPa})^n\,dA`.
@@ -87,11 +88,15 @@ def evaluate_contact(model: OringModel, loaded: LoadedRing) -> OringResult:
     """Contact, forces and shape of an equilibrium."""
     position = outline(model, loaded.state)
     pressure = walls.surface_pressure(loaded.surroundings, position)
-    axial = _axial_force(pressure, walls.node_areas(position)[:, 1], _upstream(loaded, position))
+    upstream = _upstream(loaded, position)
+    if loaded.surroundings.faces_walls:
+        axial = float(walls.surface_forces(loaded.surroundings, position).force[~upstream, 1].sum())
+    else:
+        axial = _axial_force(pressure, walls.node_areas(position)[:, 1], upstream)
     gradient = deformation_gradient(model.elements, loaded.state.displacement)
     volumes = model.elements.weights.sum(axis=1)
     ratios = volume_ratios(model.elements, gradient)
-    mean_tension = (loaded.state.tension * volumes).sum() / volumes.sum()
+    dilatation = (loaded.state.tension / np.ravel(model.rubber.bulk_modulus) * volumes).sum() / volumes.sum()
     nodes = model.mesh.nodes + loaded.state.displacement.reshape(-1, 2)
     von_mises = von_mises_stress(model.rubber, gradient).mean(axis=1)
     rod, gland, wall = (_contact(loaded, position, which) for which in (walls.ROD, walls.GLAND, walls.WALL))
@@ -102,7 +107,7 @@ def evaluate_contact(model: OringModel, loaded: LoadedRing) -> OringResult:
         wall=wall,
         axial_force=axial,
         volume_ratio=float((ratios * volumes).sum() / volumes.sum()),
-        expected_volume_ratio=float(1.0 + mean_tension / model.rubber.bulk_modulus),
+        expected_volume_ratio=float(1.0 + dilatation),
         newton_steps=loaded.newton_steps,
         shape=DeformedSection(nodes, model.mesh.elements, von_mises),
     )
@@ -130,20 +135,41 @@ def _contact(loaded: LoadedRing, position: FloatArray, wall: int) -> WallContact
     near = (stresses.argmax(axis=1) == wall) & (stresses[:, wall] > -_TOUCHING * surroundings.transition)
     areas = np.linalg.norm(walls.node_areas(position), axis=1)
     stress = walls.surface_pressure(surroundings, position).contact_stress
+    fluid = np.where(surroundings.wetted, surroundings.pressure, 0.0)
+    if surroundings.faces_walls:
+        near = stresses[:, wall] > -_TOUCHING * surroundings.transition
+        areas = walls.facing_areas(position, wall)
+        contacts = walls.wall_contacts(surroundings, position)
+        stress = contacts.excess[:, wall] + contacts.share[:, wall] * fluid
     force = float((stress * areas)[near].sum())
     along = position[:, 0] if wall == walls.WALL else position[:, 1]
-    fluid = np.where(surroundings.wetted, surroundings.pressure, 0.0)
     inside = near & (stresses[:, wall] > fluid)
-    wall_force = float((stresses[:, wall] * areas)[inside].sum())
-    order = np.argsort(along[inside], kind='stable')
+    wall_force = float((stresses[inside, wall] * areas[inside]).sum())
     if not inside.any():
         return WallContact(np.zeros(0), np.zeros(0), force, 0.0, 0.0, (0.0, 0.0))
-    contact_position, contact_stress = along[inside][order], stress[inside][order]
-    above = (stresses[:, wall] - fluid)[inside][order]
-    edges = _edge(contact_position, above), _edge(contact_position[::-1], above[::-1])
-    circumference = 2.0 * np.pi * float(position[inside, 0].mean())
+    touching = np.flatnonzero(inside)
+    touching = touching[np.argsort(along[inside], kind='stable')]
+    apart = np.abs(np.diff(touching))
+    lips = np.split(touching, np.flatnonzero((apart > 1) & (apart < len(along) - 1)) + 1)
+    above = stresses[:, wall] - fluid
+    edges = [(_edge(along[lip], above[lip]), _edge(along[lip][::-1], above[lip][::-1])) for lip in lips]
+    if surroundings.faces_walls:  # a contact ends at a corner
+        edges = [_inside_corners(along, lip, ends) for lip, ends in zip(lips, edges, strict=True)]
+    places, values, gaps = [along[lips[0]]], [stress[lips[0]]], 0.0
+    for lip, before, after in zip(lips[1:], edges, edges[1:], strict=False):
+        gap = np.sort([before[1], after[0]])  # two lips that all but touch overlap
+        places += [gap, along[lip]]
+        values += [np.zeros(2), stress[lip]]
+        gaps += float(np.ptp(gap))
     return WallContact(
-        contact_position, contact_stress, force, wall_force, float(contact_stress.max()), edges, circumference
+        np.concatenate(places),
+        np.concatenate(values),
+        force,
+        wall_force,
+        float(stress[touching].max()),
+        (edges[0][0], edges[-1][1]),
+        2.0 * np.pi * float(position[inside, 0].mean()),
+        gaps,
     )
 
 
@@ -153,7 +179,17 @@ def _power_integral(place: FloatArray, value: FloatArray, exponent: float) -> fl
     power, rise = 0.5 * exponent + 1.0, high - low
     flat = rise <= 1e-9 * high  # where the quotient of differences would round
     mean = (high**power - low**power) / (power * np.where(flat, 1.0, rise))
-    return float(np.where(flat, high ** (0.5 * exponent), mean) @ np.diff(place))
+    mean = np.where(flat, high ** (0.5 * exponent), mean)
+    return float(np.where(high > 0.0, mean, 0.0) @ np.diff(place))
+
+
+def _inside_corners(along: FloatArray, lip: IntArray, edges: tuple[float, float]) -> tuple[float, float]:
+    """Edges of a lip, moved to the next nodes of the outline where these lie nearer, to halfway for a single node."""
+    around = np.concatenate((along[lip - 1], along[(lip + 1) % len(along)], along[lip]))
+    if len(lip) == 1:
+        around = 0.5 * (around + along[lip])
+        return float(around.min()), float(around.max())
+    return max(edges[0], float(around.min())), min(edges[1], float(around.max()))
 
 
 def _edge(position: FloatArray, above: FloatArray) -> float:

@@ -15,12 +15,17 @@ The pressure acts along the normal of the deformed surface, on the deformed area
 of fluid and wall balance. It is evaluated at the nodes, each of which represents the surface halfway to its two
 neighbours: evaluation points inside the edges would impose more contact conditions than there are nodes.
 
+A node at a corner of a section has a normal that leans from that of the wall, and may touch two walls. So for sections
+with corners (``faces_walls``) each wall acts on its own, along its own normal and on the area that faces it, with what
+it adds to the pressure of the fluid.
+
 This formulation is our choice.
 """
 
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import expit
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 
@@ -40,6 +45,7 @@ class Surroundings(NamedTuple):
     penalty: float  # kappa [Pa/m]
     transition: float  # delta [Pa]
     friction: float = 0.0  # axial traction of rod and gland on the ring, directed upstream, over their share of q [-]
+    faces_walls: bool = False  # walls push along their own normals, not along that of the surface
 
 
 class SurfacePressure(NamedTuple):
@@ -89,10 +95,15 @@ def surface_forces(surroundings: Surroundings, position: FloatArray) -> SurfaceF
     total_rows = shares[:, 1:] @ walls  # dq/dx [Pa/m]
     normal, radius = _normals(position), position[:, 0]
     # force = 2 pi r q n: r and q depend on the node itself, n on its two neighbours
-    force = (radius * total)[:, None] * normal
-    by_node = radius[:, None, None] * normal[:, :, None] * total_rows[:, None, :]
-    by_node[:, :, 0] += total[:, None] * normal
     by_normal = (radius * total)[:, None, None] * np.eye(2)
+    if surroundings.faces_walls:
+        traction, by_node, by_normal = _facing_forces(surroundings, position, normal)
+        by_node, by_normal = radius[:, None, None] * by_node, radius[:, None, None] * by_normal
+    else:
+        traction = total[:, None] * normal
+        by_node = radius[:, None, None] * normal[:, :, None] * total_rows[:, None, :]
+    force = radius[:, None] * traction
+    by_node[:, :, 0] += traction
     if surroundings.friction:  # traction -mu w q along z on the length of n; `SurfaceForces` holds minus the force
         share = shares[:, 1 + ROD] + shares[:, 1 + GLAND]
         stress = surroundings.friction * share * total
@@ -107,6 +118,47 @@ def surface_forces(surroundings: Surroundings, position: FloatArray) -> SurfaceF
     by_neighbour = 0.5 * by_normal @ _TURN
     stiffness = np.concatenate((-by_neighbour, by_node, by_neighbour), axis=2)
     return SurfaceForces(2.0 * np.pi * force, 2.0 * np.pi * stiffness)
+
+
+class WallContacts(NamedTuple):
+    """What each wall adds to the fluid at the nodes of the outline, see `Surroundings.faces_walls`."""
+
+    excess: FloatArray  # of the pressure on the surface over that of the fluid [Pa], shape (s, 3)
+    share: FloatArray  # of the pressure that the wall bears and not the fluid [-], shape (s, 3)
+
+
+def wall_contacts(surroundings: Surroundings, position: FloatArray) -> WallContacts:
+    r"""Contacts with each wall on its own: smax of fluid and that wall, less p.
+
+    .. math:: c_i = \delta \ln(1 + e^{(\kappa g_i - p) / \delta})
+    """
+    fluid = np.where(surroundings.wetted, surroundings.pressure, 0.0)
+    above = (wall_stresses(surroundings, position) - fluid[:, None]) / surroundings.transition
+    return WallContacts(surroundings.transition * np.logaddexp(0.0, above), expit(above))
+
+
+def _facing_forces(
+    surroundings: Surroundings, position: FloatArray, normal: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    r"""Traction times length of `Surroundings.faces_walls`, shape (s, 2), and its derivatives by position and normal.
+
+    .. math:: t = p n + \sum_i c_i \max(n N_i, 0) N_i
+    """
+    fluid = np.where(surroundings.wetted, surroundings.pressure, 0.0)
+    excess, share = wall_contacts(surroundings, position)
+    facing = normal @ _WALL_NORMALS.T
+    faces, facing = facing > 0.0, np.maximum(facing, 0.0)
+    into = _WALL_NORMALS[:, :, None] * _WALL_NORMALS[:, None, :]
+    traction = fluid[:, None] * normal + (excess * facing) @ _WALL_NORMALS
+    by_node = surroundings.penalty * np.einsum('si,ikl->skl', share * facing, into)
+    by_normal = fluid[:, None, None] * np.eye(2) + np.einsum('si,ikl->skl', excess * faces, into)
+    return traction, by_node, by_normal
+
+
+def facing_areas(position: FloatArray, wall: int) -> FloatArray:
+    """Area of each node that faces a wall [m^2], shape (s,)."""
+    areas: FloatArray = np.maximum(node_areas(position) @ _WALL_NORMALS[wall], 0.0)
+    return areas
 
 
 def outline_freedoms(surface: IntArray) -> IntArray:

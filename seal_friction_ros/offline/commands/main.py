@@ -15,6 +15,7 @@ from seal_friction_ros.offline.commands import (
     bags,
     doctor,
     ehl,
+    export,
     health,
     identify,
     import_data,
@@ -22,6 +23,7 @@ from seal_friction_ros.offline.commands import (
     new,
     oring,
     seals,
+    section,
     topics,
     tune,
 )
@@ -37,8 +39,8 @@ GROUPS = {
     'identify': (identify, *of_studies('commands.spool'), seals),
     'watch': (monitor, topics, health),
     'tune': (tune,),
-    'compute': (oring, ehl),
-    'machine': (new, doctor),
+    'compute': (oring, section, ehl),
+    'machine': (new, export, doctor),
 }
 
 # Before numpy is loaded: the last bits of a sum depend on the number of threads, and the long, narrow matrices of a fit

@@ -15,7 +15,7 @@ def add_parser(commands: Any) -> None:
     example = 'sheet rod_seal --seal ms28775_114 --out sheet.csv'
     sheet = cli.add_command(commands, 'sheet', run_sheet, text, example)
     text = 'list the seal files with law, range and source'
-    seals = cli.add_command(commands, 'seals', run_seals, text, 'seals', 'seals my_seals --full')
+    seals = cli.add_command(commands, 'seals', run_seals, text, *_SEALS)
     text, example = 'write a page with the curves of a seal file', 'charts ms28775_114 --out ms28775_114.html'
     charts = cli.add_command(commands, 'charts', run_charts, text, example)
     text = 'friction and breakaway of a seal file, or of an O-ring from its geometry'
@@ -30,6 +30,9 @@ def add_parser(commands: Any) -> None:
     cli.add_target(sheet, '--out', DATA_SHEET, required=True, metavar='SHEET.csv', help=text)
     cli.add_file(sheet, '--seal', 'seals', 'seal file whose geometry is filled in')
     cli.add_options(sheet, _OF_SHEET)
+    seals.add_argument('--kind', choices=('rod', 'piston'), help='with --diameter: seals for a cylinder, catalogue too')
+    text = 'of the rod, or of the bore of a piston seal, in m or with a unit'
+    seals.add_argument('--diameter', type=_one('m'), metavar='D', help=text)
     seals.add_argument('folders', type=Path, nargs='*', metavar='FOLDER', help='default: config/seals')
     seals.add_argument('--full', action='store_true', help='print the whole source of each seal')
     cli.add_file(charts, 'seal', 'seals', 'seal file', metavar='SEAL')
@@ -54,6 +57,7 @@ _OF_SHEET: dict[str, tuple[str, cli.Settings]] = {
     '--force-unit': ('default N', {'choices': ('N', 'kN', 'lbf'), 'default': 'N'}),
     '--length-unit': ('default mm', {'choices': ('mm', 'in'), 'default': 'mm'}),
 }
+_SEALS = ('seals', 'seals my_seals --full', 'seals --kind rod --diameter 36mm')
 _OF_PLAN = ('tests', 'seals', 'pressure_unit', 'force_unit', 'length_unit')
 
 
@@ -96,9 +100,14 @@ def run_sheet(arguments: argparse.Namespace) -> int:
 
 def run_seals(arguments: argparse.Namespace) -> int:
     """Print a line or two for each seal file; exit code 1 if one of them cannot be used."""
-    from seal_friction_ros.offline.work.seal_list import listed_seals, seal_text
+    from seal_friction_ros.offline.work.seal_list import fitting_seals, listed_seals, seal_text
 
-    listed = listed_seals(arguments.folders)
+    if (arguments.kind is None) != (arguments.diameter is None):
+        raise ValueError('--kind and --diameter go together: rod or piston, and the diameter that slides')
+    if arguments.kind:
+        listed = fitting_seals(arguments.folders, arguments.kind, arguments.diameter)
+    else:
+        listed = listed_seals(arguments.folders)
     text = '\n'.join(seal_text(seal, full=arguments.full) for seal in listed)
     unusable = any(seal.error for seal in listed)
     return cli.print_result(arguments, {'seals': listed}, text, cli.DIFFERENT if unusable else cli.SUCCESS)

@@ -27,6 +27,7 @@ from seal_friction_ros.core.oring_contact.ring_friction import (
     friction_of_contact,
 )
 from seal_friction_ros.files import read_yaml
+from seal_friction_ros.offline.contact.section_files import with_files
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty as Spread
 from seal_friction_ros.offline.contact.uncertainty import check_unknown
 from seal_friction_ros.offline.work.progress import progress
@@ -101,7 +102,7 @@ def compute_case(
     for_seal_file: bool = False,
     for_samples: bool = False,
 ) -> Computed:
-    """Compute a case file, with a progress bar.
+    """Compute a case file, with a progress bar; its section and rubber may be in files beside it, see `with_files`.
 
     ValueError: the file is invalid or insufficient for a seal file, or the ring does not fit, does not seal or has no
     equilibrium.
@@ -117,7 +118,30 @@ def compute_case(
     """
     document = read_yaml(path)
     with named_errors(path):
-        file = parse_oring_case(document)
+        file = parse_oring_case(with_files(document, path.parent))
+    return compute_file(
+        file,
+        path,
+        pressures,
+        readings=readings,
+        law_from=law_from,
+        for_seal_file=for_seal_file,
+        for_samples=for_samples,
+    )
+
+
+def compute_file(
+    file: OringCaseFile,
+    path: Path,
+    pressures: Sequence[float] = (),
+    *,
+    readings: Sequence[Reading] = (),
+    law_from: Path | None = None,
+    for_seal_file: bool = False,
+    for_samples: bool = False,
+) -> Computed:
+    """Compute a parsed case, see `compute_case`; ``path`` names it in messages."""
+    with named_errors(path):
         wanted = tuple(pressures) or file.pressures
         check_pressures(file.case, wanted)
         if (for_seal_file or readings) and len(wanted) < 2:

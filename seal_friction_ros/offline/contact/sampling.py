@@ -109,7 +109,7 @@ def uncertain_ring(
         """The ring with these values of what is unknown."""
         varied = varied_ring(case, values)
         check_pressures(varied, pressures)
-        key = part_key('ring', [asdict(varied), pressures, type(law).__name__, asdict(law) if law else {}])
+        key = part_key('ring', [_plain(varied), pressures, type(law).__name__, asdict(law) if law else {}])
         return [Part(key, RingForces._fields, partial(ring_forces, varied, pressures, law))]
 
     outcome = sampled(f'{case.name}: samples', names, drawn, parts_of, workers, work)
@@ -143,6 +143,12 @@ def _drawn(name: str, unknowns: Sequence[Unknown], samples: int, seed: int) -> t
     """Names of the unknowns, and their values."""
     check_unknown(name, unknowns)
     return tuple(unknown.name for unknown in unknowns), latin_hypercube(unknowns, samples, seed)
+
+
+def _plain(case: OringCase) -> dict[str, Any]:
+    """A case as JSON can hold it."""
+    outlines = [part.tolist() for part in case.section or () if part is not None]
+    return {**asdict(replace(case, section=None)), 'section': outlines}
 
 
 def sampled(

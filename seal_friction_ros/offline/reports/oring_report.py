@@ -85,7 +85,7 @@ def write_oring_report(computed: Computed, out: Path, uncertainty: Uncertainty |
         summary=computed.summary,
         squeeze=squeeze(case.geometry),
         stretch=stretch(case.geometry),
-        gland_fill=gland_fill(case.geometry, case.groove),
+        gland_fill=gland_fill(case.geometry, case.groove, case.section),
         number_table=_number_table(computed),
         thesis_table=_thesis_table(computed),
         friction_table=_friction_table(computed),

@@ -1,17 +1,18 @@
-"""The seal files of some folders, each with law, range and source."""
+"""The seal files of some folders, each with law, range and source; those of the catalogue that fit a cylinder."""
 
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from seal_friction_ros.core.foundation.units import BAR, MM
+from seal_friction_ros.core.foundation.units import BAR, MM, in_si
 from seal_friction_ros.core.friction.actuator import Seal
 from seal_friction_ros.core.friction.identified_motion import ANY_MOTION
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.files import config_names, config_path, read_yaml
 
 _WIDTH = 80  # characters of a line
+_NEAR = 0.1  # difference of diameters over the wanted one, within which a seal is listed (our choice)
 
 
 class ListedSeal(NamedTuple):
@@ -22,6 +23,9 @@ class ListedSeal(NamedTuple):
     range: str = ''
     source: str = ''
     error: str = ''
+    kind: str = ''  # rod or piston; empty: the file has no geometry
+    diameter: float = 0.0  # [m] of the sliding wall
+    relative_std: float = 0.0  # [-]
 
 
 def listed_seals(folders: Sequence[Path] = ()) -> list[ListedSeal]:
@@ -37,6 +41,23 @@ def listed_seals(folders: Sequence[Path] = ()) -> list[ListedSeal]:
     return found
 
 
+def fitting_seals(folders: Sequence[Path], kind: str, diameter: float) -> list[ListedSeal]:
+    """Usable seals of a ``kind``, rod or piston, whose diameter is within a tenth of ``diameter`` [m], nearest first.
+
+    Without ``folders`` they are those of ``config/seals`` and its catalogue. ValueError: none is.
+    """
+    shipped = config_path('seals', 'placeholder').parent
+    found = listed_seals(folders) if folders else listed_seals() + listed_seals([shipped / 'catalogue'])
+    of_kind = [seal for seal in found if seal.kind == kind]
+    near = sorted(of_kind, key=lambda seal: abs(seal.diameter - diameter))
+    near = [seal for seal in near if abs(seal.diameter - diameter) <= _NEAR * diameter]
+    if not near:
+        raise ValueError(
+            f'no seal file for a {kind} of {diameter / MM:.4g} mm: compute one, see seal_friction section --help'
+        )
+    return near
+
+
 def _listed(name: str, path: Path) -> ListedSeal:
     try:
         document = read_yaml(path)
@@ -44,7 +65,17 @@ def _listed(name: str, path: Path) -> ListedSeal:
     except ValueError as error:
         return ListedSeal(name, error=str(error))
     law = seal.coulomb_law.NAME + (' with velocity terms' if seal.velocity_terms else '')
-    return ListedSeal(name, law, _range(seal), ' '.join(str(document.get('source', '')).split()))
+    geometry = document.get('geometry', {})
+    on_rod = geometry.get('sliding_wall', 'rod') == 'rod'
+    return ListedSeal(
+        name,
+        law,
+        _range(seal),
+        ' '.join(str(document.get('source', '')).split()),
+        kind=('rod' if on_rod else 'piston') if geometry else '',
+        diameter=in_si(geometry['rod_diameter' if on_rod else 'gland_diameter'], 'm', name) if geometry else 0.0,
+        relative_std=seal.uncertainty.relative_std,
+    )
 
 
 def _range(seal: Seal) -> str:
@@ -64,4 +95,5 @@ def seal_text(seal: ListedSeal, *, full: bool) -> str:
     lines = textwrap.wrap(source, _WIDTH - 4)
     if not full and len(lines) > 1:
         lines = [textwrap.shorten(source, _WIDTH - 4, placeholder=' ...')]
-    return '\n'.join([f'{seal.file}: {seal.law}, {seal.range}', *(f'    {line}' for line in lines)])
+    size = f', {seal.kind} {seal.diameter / MM:.4g} mm' if seal.kind else ''
+    return '\n'.join([f'{seal.file}: {seal.law}, {seal.range}{size}', *(f'    {line}' for line in lines)])

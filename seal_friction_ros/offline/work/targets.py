@@ -22,6 +22,7 @@ class Kind(NamedTuple):
     suffixes: tuple[str, ...] = ()  # that its name may have; empty: any
     has_page: bool = False  # with a page of the same name, and the folder of its figures
     has_mark: bool = True
+    inside: str = ''  # file that each folder of this kind has, with the mark; empty: the target is a file
 
 
 PAGE = Kind('a page', ('.html', '.htm'), has_page=True)
@@ -33,7 +34,9 @@ PARAMETER_FILE = Kind('a parameter file, with a page beside it,', ('.yaml', '.ym
 LIVE_PARAMETERS = Kind('a parameter file', ('.yaml', '.yml'))
 DATA_SHEET = Kind('a data sheet, with a page beside it,', ('.csv',), has_page=True, has_mark=False)
 TABLE = Kind('a Parquet table', ('.parquet',), has_mark=False)
-BAG = Kind('a bag', has_mark=False)
+BAG = Kind('a bag', has_mark=False, inside='metadata.yaml')
+C_LIBRARY = Kind('a C library', inside='Makefile')
+FMU = Kind('an FMU', ('.fmu',), has_mark=False)
 
 
 def mark(command: str) -> str:
@@ -77,19 +80,19 @@ def _check(target: Path, kind: Kind, inputs: Sequence[Path], command: str, *, fo
     if not parent.is_dir() or not os.access(parent, os.W_OK):
         raise ValueError(f'{target}: cannot write into {parent}')
     page = target.with_suffix('.html') if kind.has_page and kind is not PAGE else target
-    written = {target: kind.has_mark and _has_mark(target, command)}
+    written = {target: kind.has_mark and _has_mark(target / kind.inside, command)}
     if kind.has_page:
         written[page] = _has_mark(page, command)
         written[page.with_name(f'{page.stem}_figures')] = written[page]
     for path, is_own in written.items():
         if not path.exists() and not path.is_symlink():
             continue
-        resolved, is_folder = path.resolve(), kind is BAG or path not in (target, page)
+        resolved, is_folder = path.resolve(), bool(kind.inside) or path not in (target, page)
         part_of = () if is_own else resolved.parents
         if any(each == resolved or each in part_of or resolved in each.parents for each in inputs):
             raise ValueError(f'{path} belongs to an input: not overwriting it: choose another name')
-        if path.is_dir() != is_folder or (kind is BAG and not (path / 'metadata.yaml').is_file()):
-            what = 'a folder but no bag' if path.is_dir() else 'no folder'
+        if path.is_dir() != is_folder or (kind.inside and not (path / kind.inside).is_file()):
+            what = f'a folder but {kind.what.replace("a ", "no ", 1)}' if path.is_dir() else 'no folder'
             raise ValueError(f'{path} exists already and is {what}: not overwriting it: choose another name')
         if not is_own and not force:
             what = f'not overwriting it, seal_friction {command} did not make it'

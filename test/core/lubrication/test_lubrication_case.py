@@ -138,3 +138,9 @@ def test_law_has_its_rows_in_order_of_pressure_and_its_presliding_from_the_lowes
 
 
 # -- a seal at rest
+
+
+def test_a_section_that_is_not_round_has_no_film():
+    drawn = parse_oring_case({**RING, 'section': {'shape': 'x_ring'}})
+    with pytest.raises(ValueError, match='the film is computed for round rings: ms28775_114_blind'):
+        parse_lubrication_case({'name': 'x', 'oring': 'blind'}, lambda _: drawn)

@@ -281,11 +281,12 @@ def test_the_guide_is_a_couple_on_the_nodes_halfway_to_rod_and_gland():
     assert np.delete(couple, [low, high]) == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.parametrize('faces_walls', [False, True])
 @pytest.mark.parametrize('friction', [0.0, 0.1])
-def test_the_stiffness_is_the_derivative_of_the_forces_to_1e_8(friction: float):
+def test_the_stiffness_is_the_derivative_of_the_forces_to_1e_8(friction: float, faces_walls: bool):
     model = make_model(MESH, RUBBER, SECTION, 0.05)
     assembly = make_assembly(model)
-    surroundings = around(friction=friction)
+    surroundings = around(friction=friction, faces_walls=faces_walls)
     state, step = OringState(shaken(), None), 1e-9
     at = force_balance(model, surroundings, state)
     matrix = stiffness_matrix(assembly, at.entries).toarray()

@@ -1,5 +1,7 @@
 """The rubber of the finite-element O-ring: derivatives of its energy, small strains, no part of it in pure volume."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from seal_friction_ros.core.oring_contact.material import (
     elastic_modulus_of_hardness,
     hardness_of_elastic_modulus,
     mooney_rivlin_constants,
+    rubber_of_tension,
     shear_response,
     volume_response,
     von_mises_stress,
@@ -94,3 +97,47 @@ def test_a_hardness_beyond_the_rule_is_refused(hardness: float):
 def test_what_is_no_rubber_is_refused():
     with pytest.raises(ValueError, match='not a nearly incompressible rubber'):
         Rubber(elastic_modulus=1e9, bulk_modulus=2e9)
+
+
+YEOH = Rubber(elastic_modulus=6e6, mooney_ratio=0.2, yeoh_second=-0.1, yeoh_third=0.05)
+
+
+def test_the_rubber_of_yeoh_has_the_derivatives_of_its_energy():
+    gradient = np.array([1.3, 0.2, -0.1, 0.8, 1.1])
+    response = shear_response(YEOH, gradient)
+    step = 1e-6
+    steps = step * np.eye(5)
+    around = [[shear_response(YEOH, gradient + sign * s) for s in steps] for sign in (1.0, -1.0)]
+    slope = [up.energy - down.energy for up, down in zip(*around, strict=True)]
+    curve = [up.stress - down.stress for up, down in zip(*around, strict=True)]
+    assert response.stress.ravel() == pytest.approx(np.ravel(slope) / (2.0 * step), rel=1e-6)
+    assert response.stiffness.ravel() == pytest.approx(np.ravel(curve) / (2.0 * step), rel=1e-6, abs=1.0)
+
+
+def tension(rubber: Rubber, stretch: np.ndarray) -> np.ndarray:
+    """Nominal stress of a free bar: dW/d lambda along the incompressible path."""
+    step = 1e-6
+
+    def energy(at: np.ndarray) -> np.ndarray:
+        zero = np.zeros_like(at)
+        return shear_response(rubber, np.stack((at**-0.5, zero, zero, at, at**-0.5), axis=-1)).energy
+
+    return (energy(stretch + step) - energy(stretch - step)) / (2.0 * step)
+
+
+def test_a_tension_test_gives_its_rubber_back():
+    stretch = np.linspace(0.8, 2.0, 25)
+    yeoh = rubber_of_tension(stretch, tension(replace(YEOH, mooney_ratio=0.0), stretch))
+    assert (yeoh.elastic_modulus, yeoh.yeoh_second, yeoh.yeoh_third) == pytest.approx((6e6, -0.1, 0.05), rel=1e-4)
+    rivlin = Rubber(elastic_modulus=5e6, mooney_ratio=0.3)
+    found = rubber_of_tension(stretch, tension(rivlin, stretch), 'mooney')
+    assert (found.elastic_modulus, found.mooney_ratio) == pytest.approx((5e6, 0.3), rel=1e-4)
+
+
+def test_a_curve_that_is_no_tension_test_is_refused():
+    with pytest.raises(ValueError, match='four points or more'):
+        rubber_of_tension(np.array([1.0, 1.1, 1.2, 1.3]), np.zeros(4))
+    with pytest.raises(ValueError, match='not that of a rubber of mooney'):
+        rubber_of_tension(np.linspace(1.1, 2.0, 9), -np.linspace(1.0, 2.0, 9), 'mooney')
+    with pytest.raises(ValueError, match="'ogden' is none of mooney, yeoh"):
+        rubber_of_tension(np.linspace(1.1, 2.0, 9), np.ones(9), 'ogden')

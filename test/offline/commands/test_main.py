@@ -370,3 +370,28 @@ def _read(handle: int) -> bytes:
         return os.read(handle, 1000)
     except OSError:  # Linux: the other end is closed
         return b''
+
+
+def test_seals_finds_those_for_a_cylinder_nearest_first(capsys):
+    assert main(['seals', '--kind', 'rod', '--diameter', '36mm', '--json']) == 0
+    found = json.loads(capsys.readouterr().out)['seals']
+    assert found[0]['diameter'] == pytest.approx(36e-3)
+    assert {seal['kind'] for seal in found} == {'rod'}
+    distances = [abs(seal['diameter'] - 36e-3) for seal in found]
+    assert distances == sorted(distances)
+    assert max(distances) <= 3.6e-3
+    assert main(['seals', '--kind', 'piston', '--diameter', '1m']) == 2
+    assert 'no seal file for a piston of 1000 mm: compute one' in capsys.readouterr().err
+    assert main(['seals', '--kind', 'rod']) == 2
+    assert '--kind and --diameter go together' in capsys.readouterr().err
+
+
+def test_every_seal_of_the_catalogue_says_that_it_is_computed_and_how_far_off_it_may_be(capsys):
+    folder = ROOT / 'config' / 'seals' / 'catalogue'
+    assert main(['seals', str(folder), '--json']) == 0
+    found = json.loads(capsys.readouterr().out)['seals']
+    assert len(found) >= 15
+    for seal in found:
+        assert seal['source'].startswith('Computed, no reading: friction within a factor of 3.')
+        assert seal['relative_std'] == 2.0
+        assert seal['law'] == 'contact_shear'

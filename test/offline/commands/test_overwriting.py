@@ -35,6 +35,8 @@ COMMANDS = {
     ('ehl', 'run'): ['inner_seal'],
     ('ehl', 'study'): ['inner_seal'],
     ('ehl', 'map'): ['inner_seal'],
+    ('export', 'c'): ['delft_o_ring'],
+    ('export', 'fmu'): ['delft_o_ring'],
 }
 """command -> its arguments besides the targets; a command that is missing here writes nothing"""
 
@@ -82,6 +84,9 @@ def test_what_a_command_did_not_make_is_refused(command, option, kind: Kind, tmp
     target = tmp_path / f'mine{kind.suffixes[0] if kind.suffixes else ""}'
     if kind is BAG:
         write_inputs(target, 3)
+    elif kind.inside:
+        target.mkdir()
+        (target / kind.inside).write_text(f'my own notes, {mark("info")}\n')
     else:
         target.write_text(f'my own notes, {mark("info")}\n')
     said = refused(command_line(command, option, target), tmp_path, capsys)

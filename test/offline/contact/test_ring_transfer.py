@@ -76,3 +76,13 @@ def test_the_shipped_seal_has_the_law_of_the_readings_of_the_thesis(thesis):
     found = fitted(thesis, thesis.readings)
     assert found.shear_stress == pytest.approx(stress, rel=0.02)
     assert found.exponent == pytest.approx(exponent, abs=0.02)
+
+
+def test_one_reading_of_the_x_ring_predicts_1_to_5_bar_within_20_percent_and_misses_7_bar():
+    ring = ring_of('delft_x_ring', DELFT_LINES)
+    found = with_one_reading(ring)
+    after_3_bar = found['shear law'][1]
+    assert np.abs(after_3_bar[[0, 2]]).max() < 20.0
+    assert np.abs(found['mu N'][:3, :3]).max() < 10.0  # each from each of the three
+    assert after_3_bar[3] < -35.0  # friction doubles from 5 to 7 bar, the contact does not
+    assert found['mu N'][1][3] < -30.0

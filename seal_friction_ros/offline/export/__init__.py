@@ -1,0 +1,1 @@
+"""The estimator inside other programs: C generated from its functions, and FMUs."""

@@ -1,0 +1,181 @@
+"""``seal_friction export fmu``: the estimator, or the friction of the seals, for simulation tools (FMI 2.0 and 3.0).
+
+- ``estimator``: co-simulation; one step is one sample of `LoopSample`, at the time at which the step begins.
+- ``friction``: co-simulation and model exchange, without states: `friction_on_rod`.
+
+The binary is for this machine; the sources in the FMU are for all others.
+"""
+
+import math
+import platform
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.sax.saxutils import quoteattr
+from zipfile import ZIP_DEFLATED, ZipFile
+
+from seal_friction_ros.core.estimation.configuration import Configuration, first_snapshot, snapshot_text
+from seal_friction_ros.core.estimation.loop import LoopSample, RodLoad
+from seal_friction_ros.core.friction.states import StateFriction
+from seal_friction_ros.core.messages.records import FeedForward, FrictionEstimate
+from seal_friction_ros.offline.export.c_library import digest, filled, sources
+from seal_friction_ros.offline.export.c_types import fields_of, meanings_of, number
+
+PLATFORMS = {('2', 'x86_64'): 'linux64', ('3', 'x86_64'): 'x86_64-linux', ('3', 'aarch64'): 'aarch64-linux'}
+"""FMI version and machine -> folder of the binary; no binary for others."""
+
+
+class Variable(NamedTuple):
+    """One variable of the FMU."""
+
+    name: str
+    place: str  # in C, of the instance
+    kind: Any  # float or int
+    is_input: bool
+    start: float
+    meaning: str
+
+
+def variables(model: str) -> list[Variable]:
+    """Inputs and outputs of a model; a value reference is a place in this list, after that of time, 0."""
+    if model == 'friction':
+        return [*_members(RodLoad, 'load', is_input=True), *_members(StateFriction, 'friction')]
+    made = [*_members(LoopSample, 'sample', is_input=True), *_members(FrictionEstimate, 'answers.friction_estimate')]
+    return made + [
+        one._replace(name=f'feedforward_{one.name}') for one in _members(FeedForward, 'answers.feed_forward')
+    ]
+
+
+def _members(kind: Any, place: str, *, is_input: bool = False) -> list[Variable]:
+    starts, meanings = getattr(kind, '_field_defaults', {}) if is_input else {}, meanings_of(kind)
+    return [
+        Variable(name, f'{place}.{name}', each, is_input, starts.get(name, 0.0), meanings.get(name, ''))
+        for name, each in fields_of(kind).items()
+        if name != 'stamp'
+    ]
+
+
+class Export(NamedTuple):
+    """What was made."""
+
+    fmu: Path
+    model: str
+    fmi: str  # version
+    has_binary: bool
+
+    def summary(self) -> str:
+        """One line."""
+        return f'{self.fmu}: {self.model}, FMI {self.fmi}.0, {"binary and " if self.has_binary else ""}sources'
+
+
+def export_fmu(configuration: Configuration, fmu: Path, model: str = 'estimator', fmi: str = '3') -> Export:
+    """Write an FMU.
+
+    Args:
+        configuration: Seal files and settings.
+        fmu: File to write.
+        model: ``estimator`` or ``friction``.
+        fmi: Version, ``2`` or ``3``.
+
+    Raises:
+        ValueError: A law of the configuration cannot be translated.
+    """
+    document, name = snapshot_text(first_snapshot(configuration)), f'seal_{model}'
+    library = sources(configuration.parameters(), document, name)
+    files = {file: library[file] for file in (f'{name}.c', f'{name}.h')} | {'fmu.c': _source(model, fmi, name)}
+    folder = PLATFORMS.get((fmi, platform.machine()))
+    binary = _built(files) if folder and platform.system() == 'Linux' and shutil.which('cc') else b''
+    with ZipFile(fmu, 'w', ZIP_DEFLATED) as file:
+        file.writestr('modelDescription.xml', _description(model, fmi, name, digest(document)))
+        file.writestr('resources/configuration.json', document)
+        for each, text in files.items():
+            file.writestr(f'sources/{each}', text)
+        if fmi == '3':
+            file.writestr('sources/buildDescription.xml', _BUILD.format(name=name))
+        if binary:
+            file.writestr(f'binaries/{folder}/{name}.so', binary)
+    return Export(fmu, model, fmi, bool(binary))
+
+
+def _source(model: str, fmi: str, name: str) -> str:
+    places = {float: '', int: ''}
+    for reference, each in enumerate(variables(model), start=1):
+        places[each.kind] += f'    case {reference}: return &self->{each.place};\n'
+    inputs = sum(each.is_input for each in variables(model))
+    values = {'reals': places[float], 'integers': places[int], 'inputs': str(inputs), 'name': name, 'fmi': fmi}
+    starts = ' '.join(f'self->{each.place} = {number(each.start)};' for each in variables(model)[:inputs])
+    return filled('fmu.c', {**values, 'starts': starts, 'is_estimator': str(int(model == 'estimator'))})
+
+
+def _built(files: dict[str, str]) -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        for name, text in files.items():
+            (Path(folder) / name).write_text(text, encoding='utf-8')
+        inputs = [name for name in files if name.endswith('.c')]
+        command = [
+            'cc',
+            '-std=c11',
+            '-O2',
+            '-ffp-contract=off',
+            '-fPIC',
+            '-shared',
+            '-Wl,-Bsymbolic',
+            '-o',
+            'fmu.so',
+            *inputs,
+            '-lm',
+        ]
+        subprocess.run(command, cwd=folder, check=True, capture_output=True)
+        return (Path(folder) / 'fmu.so').read_bytes()
+
+
+# -- modelDescription.xml ---------------------------------------------------------------------------------------------
+
+_BUILD = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiBuildDescription fmiVersion="3.0">
+  <BuildConfiguration modelIdentifier="{name}">
+    <SourceFileSet language="C11"><SourceFile name="fmu.c"/><SourceFile name="{name}.c"/></SourceFileSet>
+  </BuildConfiguration>
+</fmiBuildDescription>
+"""
+
+
+def _description(model: str, fmi: str, name: str, token: str) -> str:
+    files = f'<SourceFiles><File name="fmu.c"/><File name="{name}.c"/></SourceFiles>' if fmi == '2' else ''
+    kinds = ['CoSimulation'] if model == 'estimator' else ['ModelExchange', 'CoSimulation']
+    variable = ' canHandleVariableCommunicationStepSize="true"'
+    interfaces = [
+        f'<{kind} modelIdentifier="{name}"{variable if kind == "CoSimulation" else ""}>{files}</{kind}>'
+        for kind in kinds
+    ]
+    head = {'2': f'guid="{token}" numberOfEventIndicators="0"', '3': f'instantiationToken="{token}"'}[fmi]
+    known = variables(model)
+    outputs = [i for i, each in enumerate(known, start=1) if not each.is_input]
+    if fmi == '2':
+        unknowns = ''.join(f'<Unknown index="{i + 1}"/>' for i in outputs)
+        lists = [f'<{group}>{unknowns}</{group}>' for group in ('Outputs', 'InitialUnknowns')]
+    else:
+        lists = [f'<{each} valueReference="{i}"/>' for each in ('Output', 'InitialUnknown') for i in outputs]
+    return '\n'.join([
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        f'<fmiModelDescription fmiVersion="{fmi}.0" modelName="{name}" {head} generationTool="seal_friction export">',
+        *interfaces, '<ModelVariables>', *(_variable(fmi, i, each) for i, each in enumerate([_TIME, *known])),
+        '</ModelVariables>', '<ModelStructure>', *lists, '</ModelStructure>', '</fmiModelDescription>', '',
+    ])  # fmt: skip
+
+
+_TIME = Variable('time', '', float, False, 0.0, '[s]')
+
+
+_TAGS = {('2', float): 'Real', ('2', int): 'Integer', ('3', float): 'Float64', ('3', int): 'Int64'}
+
+
+def _variable(fmi: str, reference: int, each: Variable) -> str:
+    causality = 'independent' if each is _TIME else 'input' if each.is_input else 'output'
+    variability, tag = 'continuous' if each.kind is float else 'discrete', _TAGS[fmi, each.kind]
+    start = f' start="{"NaN" if math.isnan(each.start) else each.start}"' if each.is_input else ''
+    given = f'name="{each.name}" valueReference="{reference}" causality="{causality}" variability="{variability}"'
+    given += f' description={quoteattr(each.meaning)}' if each.meaning else ''
+    return f'<ScalarVariable {given}><{tag}{start}/></ScalarVariable>' if fmi == '2' else f'<{tag} {given}{start}/>'

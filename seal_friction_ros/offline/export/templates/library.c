@@ -1,0 +1,83 @@
+/* ${mark} from the functions of the Python package, see the names of the functions. Do not edit. */
+#include "${name}.h"
+#include <float.h>
+#include <math.h>
+#include <string.h>
+#if FLT_EVAL_METHOD != 0 || defined(__FAST_MATH__)
+#error "double must be IEEE double precision, without -ffast-math"
+#endif
+
+${types}
+${functions}
+static bool in_bounds(int64_t time) { return time >= -${latest} && time <= ${latest}; }
+
+static void clear(${name}_answers *answers) { ${clear} }
+
+#define RECEIVE(function) \
+    clear(answers); \
+    if (!in_bounds(message.stamp) || received < 0 || !in_bounds(received) || sent < 0 || !in_bounds(sent)) return false; \
+    function(state, message, received, answers, sent); \
+    return true;
+
+static uint64_t bits_of_double(double value) { uint64_t bits; memcpy(&bits, &value, sizeof bits); return bits; }
+static uint64_t bits_of_int64_t(int64_t value) { return (uint64_t)value; }
+static uint64_t bits_of_bool(bool value) { return value; }
+static double double_of(uint64_t bits) { double value; memcpy(&value, &bits, sizeof bits); return value; }
+static int64_t int64_t_of(uint64_t bits) { return (int64_t)bits; }
+static bool bool_of(uint64_t bits) { return bits != 0; }
+
+static uint8_t *put(uint8_t *at, uint64_t bits)
+{
+    for (int i = 0; i < 8; i++) *at++ = (uint8_t)(bits >> (8 * i));
+    return at;
+}
+
+static uint64_t take(const uint8_t **at)
+{
+    uint64_t bits = 0;
+    for (int i = 0; i < 8; i++) bits |= (uint64_t)*(*at)++ << (8 * i);
+    return bits;
+}
+
+const char *${name}_version(void) { return "${version}"; }
+const char *${name}_hash(void) { return "${hash}"; }
+
+void ${name}_init(${name}_pipeline_state *state)
+{
+    static const ${name}_pipeline_state first = ${first};
+    *state = first;
+}
+
+void ${name}_reset(${name}_pipeline_state *state) { ${name}_init(state); }
+
+bool ${name}_step(${name}_pipeline_state *state, const ${name}_loop_sample *sample, ${name}_answers *answers)
+{
+    clear(answers);
+    if (sample->stamp < 0 || !in_bounds(sample->stamp)) {
+        return false;
+    }
+    ${step}(state, *sample, answers);
+    return true;
+}
+
+${bodies}
+bool ${name}_is_tick_due(${name}_pipeline_state *state, int64_t now) { return ${due}(state, now); }
+
+${name}_state_friction ${name}_friction_on_rod(${name}_rod_load load) { return ${friction}(load); }
+
+void ${name}_save(const ${name}_pipeline_state *state, uint8_t *bytes)
+{
+    uint8_t *at = bytes + 32;
+    memcpy(bytes, "${hash}", 32); /* half of it tells configurations apart */
+${save}
+}
+
+bool ${name}_load(${name}_pipeline_state *state, const uint8_t *bytes)
+{
+    const uint8_t *at = bytes + 32;
+    if (memcmp(bytes, "${hash}", 32) != 0) {
+        return false;
+    }
+${load}
+    return true;
+}

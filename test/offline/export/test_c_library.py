@@ -1,0 +1,212 @@
+"""The exported C library computes what replay computes, to the byte, and stands alone."""
+
+import ctypes
+import math
+import re
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from core.estimation.test_compiled_pipeline import ACTUATORS, DEFAULT, TYPES, noisy, receipts, with_seals
+from harness.c_library import CEstimator, to_struct
+from offline.commands.test_main import PULL_TEST
+from paths import ROOT
+
+from seal_friction_ros import Estimator
+from seal_friction_ros.core.estimation.configuration import first_snapshot, snapshot_text
+from seal_friction_ros.core.estimation.loop import LoopSample, RodLoad, friction_on_rod, receive_sample
+from seal_friction_ros.core.estimation.pipeline import answered, init, is_tick_due
+from seal_friction_ros.core.friction.states import StateFriction
+from seal_friction_ros.core.messages.coder import decode, encode, type_of
+from seal_friction_ros.core.messages.records import Clock, Velocity, WatchdogTick, numbers_in
+from seal_friction_ros.offline.bags.actuator_bag import first_snapshot as first_of_bag
+from seal_friction_ros.offline.bags.actuator_bag import open_actuator
+from seal_friction_ros.offline.commands.main import main
+from seal_friction_ros.offline.export.c_library import digest, example_samples, sources
+from seal_friction_ros.offline.replay.replay import Replay
+
+BAGS = ('pull_test', 'faults')
+SEALS = ['ms28775_114@a', 'ms28775_114@b']
+ELASTIC = {'presliding': True, 'presliding_against_motion': True, 'velocity_resolution': 0.01}
+
+
+@pytest.fixture(scope='module')
+def default(tmp_path_factory) -> CEstimator:
+    """The default actuator with a force and adaptation, as a library."""
+    return CEstimator(DEFAULT, tmp_path_factory.mktemp('default'))
+
+
+@pytest.fixture
+def fresh(default: CEstimator) -> CEstimator:
+    default.call('reset')
+    return default
+
+
+def without_frame(answers: list[tuple[str, bytes]]) -> list[tuple[str, bytes]]:
+    return [(name, encode(decode(name, data), b'')) for name, data in answers]
+
+
+def assert_same(library: CEstimator, parameters, messages) -> None:
+    """The library answers each message, received and sent at a time, with the bytes of Python; so do the states."""
+    state = init(parameters)
+    for message, received, sent in messages:
+        state, expected = answered(parameters, state, message, received, sent)
+        assert library.receive(message, received, sent) == without_frame(expected), message
+    assert repr(library.known()) == repr(state)
+
+
+def sampled(samples: int, seed: int) -> Iterator[tuple[object, int, int]]:
+    """Messages of a rod with sensor faults, some late, with a tick and simulated time now and then."""
+    pieces = noisy(samples, seed)
+    for i, ((kind, data), received) in enumerate(zip(pieces, receipts(pieces), strict=True)):
+        late = 40_000_000 if i % 50 == 7 else 0
+        yield decode(TYPES[kind], data), received, received - late
+        if i % 400 == 13:
+            yield WatchdogTick(received, 0.02), received, received
+        if i > 2000 and i % 100 == 0:
+            yield Clock(received - 10**18), received, received
+
+
+def test_random_messages_with_faults_give_the_bytes_and_the_state_of_replay(fresh: CEstimator):
+    assert_same(fresh, DEFAULT, sampled(1000, 1))
+
+
+def test_every_law_and_an_elastic_actuator_give_the_bytes_of_replay(tmp_path: Path):
+    parameters = with_seals(ACTUATORS['others'], **ELASTIC)
+    assert_same(CEstimator(parameters, tmp_path, 'others'), parameters, sampled(700, 2))
+
+
+@pytest.mark.parametrize('bag', BAGS)
+def test_a_reference_bag_gives_its_recorded_bytes(bag: str, tmp_path: Path):
+    source = open_actuator(ROOT / 'bags' / bag)
+    configuration = first_configuration(bag)
+    library = CEstimator(configuration.parameters(), tmp_path)
+    replay, compared = Replay(source.path), 0
+    for step in replay.steps():
+        name = step.message.type_name
+        if name in TYPES.values():
+            received = step.message.log_time
+            sent = step.message.publish_time if configuration.tells_sending else received
+            found = library.receive(decode(name, step.message.data), received, sent)
+            assert found == without_frame([(answer.type_name, answer.data) for answer in step.answers])
+            compared += len(found)
+    assert compared > 300
+
+
+def first_configuration(bag: str):
+    """Configuration at the beginning of a reference bag."""
+    source = open_actuator(ROOT / 'bags' / bag)
+    first = first_of_bag(source.path, source.messages(), source.topics.configuration)
+    assert first is not None
+    return first.configurations['']
+
+
+def test_a_step_of_a_loop_is_that_of_python(fresh: CEstimator):
+    state, random, answers = init(DEFAULT), np.random.default_rng(5), list[tuple[str, bytes]]()
+    for i in range(1500):
+        values = [0.05 * math.sin(i / 90), *(1e6 * random.random(2)).tolist(), *random.normal(size=3).tolist(), 20.0]
+        sample = LoopSample(i * 1_000_000, *(math.nan if random.random() < 0.03 else value for value in values))
+        answers.clear()
+        receive_sample(DEFAULT, state, sample, lambda one, _: answers.append((type_of(one), encode(one, b''))))
+        assert fresh.step(sample) == answers
+    assert repr(fresh.known()) == repr(state)
+
+
+def test_a_saved_state_goes_on_in_another_process_and_another_configuration_refuses_it(fresh: CEstimator):
+    for message, *times in sampled(300, 3):
+        fresh.receive(message, *times)
+    size = 32 + 8 * len(list(numbers_in(fresh.known())))
+    saved, before = (ctypes.c_uint8 * size)(), repr(fresh.known())
+    fresh.call('save', saved)
+    fresh.call('reset')
+    assert repr(fresh.known()) == repr(init(DEFAULT))
+    assert fresh.call('load', saved, returns=ctypes.c_bool)
+    assert repr(fresh.known()) == before
+    saved[0] += 1
+    assert not fresh.call('load', saved, returns=ctypes.c_bool)
+
+
+def test_the_watchdog_is_due_when_it_is_in_python(fresh: CEstimator):
+    due = []
+    for message, received, sent in sampled(250, 4):
+        fresh.receive(message, received, sent)
+        for now in (received, received + 20_000_000):
+            due.append(fresh.call('is_tick_due', ctypes.c_int64(now), returns=ctypes.c_bool))
+            assert due[-1] == is_tick_due(fresh.known(), now)
+    assert True in due
+    assert False in due
+
+
+def test_a_time_beyond_its_bounds_is_refused_and_changes_nothing(fresh: CEstimator):
+    before = repr(fresh.known())
+    for stamp, received in ((2**62, 5), (5, -1), (5, 2**62)):
+        with pytest.raises(AssertionError):
+            fresh.receive(Velocity(stamp, 0.1), received, received)
+    assert repr(fresh.known()) == before
+
+
+def test_friction_on_a_rod_is_that_of_python(default: CEstimator):
+    function, random = default.library.seal_friction_friction_on_rod, np.random.default_rng(6)
+    function.restype = type(to_struct(StateFriction(0, 0, 0.0)))
+    for _ in range(500):
+        load = RodLoad(*(random.normal(size=4) * [0.01, 1e6, 1e6, 40.0] * (random.random(4) > 0.1)).tolist())
+        found, expected = function(to_struct(load)), friction_on_rod(DEFAULT.estimator, load)
+        assert (found.state, found.direction, found.friction_force) == expected
+
+
+@pytest.fixture(scope='module')
+def exported(tmp_path_factory) -> Path:
+    """The folder that the command makes."""
+    folder = tmp_path_factory.mktemp('exported') / 'friction_c'
+    assert main(['export', 'c', *SEALS, '--bag', PULL_TEST, '--out', str(folder)]) == 0
+    return folder
+
+
+def test_the_folder_makes_the_examples_and_both_answer_what_python_computes(exported: Path):
+    subprocess.run(['make', '-s'], cwd=exported, check=True)  # compares both
+    in_c = (exported / 'answers.csv').read_text()
+    samples = np.genfromtxt(exported / 'example.csv', delimiter=',', names=True)
+    columns = {name: samples[name] for name in samples.dtype.names if name != 'stamp'}
+    log = np.genfromtxt(in_c.splitlines(), delimiter=',', names=True)
+    replayed = Estimator(SEALS).over({'time': samples['stamp'] * 1e-9, **columns})
+    assert len(log) > 300
+    for name in ('friction_force', 'coulomb_friction', 'coulomb_friction_std', 'state', 'status'):
+        assert np.array_equal(log[name], replayed[name]), name
+
+
+def test_the_library_tells_its_configuration_and_needs_nothing_but_libm(exported: Path):
+    document = (exported / 'configuration.json').read_text()
+    assert document == snapshot_text(first_snapshot(Estimator(SEALS).configuration))
+    library = exported / 'libseal_friction.so'
+    assert digest(document).encode() in library.read_bytes()
+    linked = subprocess.run(['ldd', library], capture_output=True, text=True, check=True).stdout
+    needed = {line.split()[0].split('/')[-1] for line in linked.splitlines()}
+    assert {name for name in needed if not name.startswith(('linux-vdso', 'ld-linux'))} <= {'libm.so.6', 'libc.so.6'}
+    symbols = subprocess.run(['nm', library], capture_output=True, text=True, check=True).stdout
+    wanted = set(re.findall(r' U (\w+)', symbols))
+    assert wanted <= {'exp', 'log', 'pow', 'sqrt', 'tanh', 'memcpy', 'memset', 'memcmp'}  # no allocation among them
+    assert not re.findall(r' [bBdD] (?!_|completed)(\w+)', symbols)  # no hidden state
+
+
+def test_a_folder_of_somebody_else_a_name_that_c_does_not_take_and_no_seals_are_refused(tmp_path: Path, capsys):
+    (tmp_path / 'mine.txt').write_text('mine')
+    assert main(['export', 'c', 'delft_o_ring', '--out', str(tmp_path)]) == 2
+    assert 'a folder but no C library' in capsys.readouterr().err
+    assert main(['export', 'c', 'delft_o_ring', '--name', 'my-lib', '--out', str(tmp_path / 'new')]) == 2
+    assert '--name my-lib' in capsys.readouterr().err
+    assert main(['export', 'c', '--out', str(tmp_path / 'new')]) == 2
+    assert 'no seals' in capsys.readouterr().err
+    assert not (tmp_path / 'new').exists()
+
+
+def test_the_example_runs_clean_under_the_sanitizers(tmp_path: Path):
+    for file, text in sources(first_configuration('faults').parameters(), '{}', 'rod').items():
+        (tmp_path / file).write_text(text)
+    (tmp_path / 'example.csv').write_text(example_samples())
+    flags = 'CFLAGS=-O0 -Werror -fsanitize=address,undefined -fno-sanitize-recover=all'
+    subprocess.run(['make', '-s', 'example_c', flags], cwd=tmp_path, check=True)
+    run = subprocess.run(['./example_c', 'example.csv'], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert len(run.stdout.splitlines()) == 1001
+    assert run.stderr == ''
