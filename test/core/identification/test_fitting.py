@@ -439,12 +439,12 @@ def test_the_one_pressure_that_disagrees_is_the_outlier(level, factor):
     readings = noted(scatter=0.03, pressures=5, law=ELASTIC, values=POWER | {'pressure_exponent': 2.0 / 3.0})
     force = np.where(readings.level == level, factor * readings.force, readings.force)
     spoiled = FrictionReadings(**{**vars(noted(pressures=5)), 'force': force})
-    assert outlying_level(laws, spoiled, 0.04).level == level
-    assert outlying_level(laws, readings, 0.04) is None
+    assert outlying_level(laws, spoiled).level == level
+    assert outlying_level(laws, readings) is None
 
 
 def test_three_pressures_have_no_outlier():
-    assert outlying_level([ELASTIC], noted(pressures=3), 0.04) is None
+    assert outlying_level([ELASTIC], noted(pressures=3)) is None
 
 
 def test_sources_that_disagree_at_a_pressure_are_named():

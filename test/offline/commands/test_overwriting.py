@@ -37,6 +37,8 @@ COMMANDS = {
     ('ehl', 'map'): ['inner_seal'],
     ('export', 'c'): ['delft_o_ring'],
     ('export', 'fmu'): ['delft_o_ring'],
+    ('section',): ['x_ring', '--height', '3.53mm', '--rod', '25.4mm', '--gland', '31.55mm', '--pressure', '20bar'],
+    ('topics', 'param'): ['friction_estimator'],
 }
 """command -> its arguments besides the targets; a command that is missing here writes nothing"""
 
@@ -53,7 +55,7 @@ def targets() -> list[tuple[tuple[str, ...], str, Kind]]:
 def command_line(command: tuple[str, ...], option: str, target: Path) -> list[str]:
     """Arguments of a command that writes ``target``, and what it needs besides."""
     other = target.with_name('o.html' if command[0] == 'fleet' else 'o.yaml')
-    needed = [] if option == '--out' or command[0] in ('oring', 'ehl') else ['--out', str(other)]
+    needed = [] if option == '--out' or command[0] in ('oring', 'ehl', 'topics') else ['--out', str(other)]
     return [*command, *COMMANDS[command], *needed, option, str(target)]
 
 
@@ -75,7 +77,7 @@ def refused(arguments: list[str], folder: Path, capsys) -> str:
 def test_every_option_that_writes_is_known_as_a_target():
     assert {command for command, _, _ in targets()} == set(COMMANDS)
     for command, parser in parsers(make_parser()).items():
-        written = {'out', 'report', 'seal_file', 'next', 'parquet'} & {action.dest for action in parser._actions}
+        written = {'out', 'report', 'seal_file', 'next', 'parquet', 'save'} & {action.dest for action in parser._actions}
         assert written == set(parser.get_default('targets') or {}), command
 
 

@@ -88,7 +88,7 @@ def test_the_page_shows_the_numbers_the_seal_and_the_settings(tmp_path):
     (stick_velocity,) = (row for row in page.table('setting') if row['setting'] == 'stick_velocity')
     assert (stick_velocity['value'], stick_velocity['unit']) == ('0.001', 'm/s')
     assert 'area_deformation_gain' in page.texts['pre'][0]
-    json.dumps(dataclasses.asdict(summary), default=str, allow_nan=False)
+    json.dumps(summary._asdict(), default=str, allow_nan=False)
 
 
 @pytest.mark.renders

@@ -43,4 +43,4 @@ def test_a_bag_and_a_seal_or_a_tolerance_with_a_page_are_refused(tmp_path: Path,
     assert main(['compare', str(PULL_TEST), 'ms28775_114', *out]) == 2
     assert 'give two of a kind' in capsys.readouterr().err
     assert main(['compare', str(PULL_TEST), str(PULL_TEST), '--rtol', '0.1', *out]) == 2
-    assert '--rtol is for messages of equal stamp' in capsys.readouterr().err
+    assert '--rtol is only for messages of equal stamp' in capsys.readouterr().err
