@@ -77,7 +77,9 @@ def refused(arguments: list[str], folder: Path, capsys) -> str:
 def test_every_option_that_writes_is_known_as_a_target():
     assert {command for command, _, _ in targets()} == set(COMMANDS)
     for command, parser in parsers(make_parser()).items():
-        written = {'out', 'report', 'seal_file', 'next', 'parquet', 'save'} & {action.dest for action in parser._actions}
+        written = {'out', 'report', 'seal_file', 'next', 'parquet', 'save'} & {
+            action.dest for action in parser._actions
+        }
         assert written == set(parser.get_default('targets') or {}), command
 
 
