@@ -210,9 +210,9 @@ def friction_magnitude(terms: Terms, direction: float, speed: float, friction: f
 @compilable
 def expected(terms: Terms, reading: Reading) -> float:
     """Force sum that these terms let a reading expect [N]."""
-    s, c, k, a, b, _, n, u = terms
-    direction, law = reading.direction, reading.friction
-    return direction * (s * law + c + u) + k * reading.velocity + a * law + b + n
+    t, law = terms, reading.friction
+    friction = reading.direction * (t.scale * law + t.coulomb + t.misfit)
+    return friction + t.viscous * reading.velocity + t.asymmetry * law + t.offset + t.remainder
 
 
 @compilable
@@ -220,20 +220,16 @@ def _gains(covariance: Covariance, reading: Reading) -> Terms:
     """Covariance of each term with what a reading has to show [N times the unit of the term]."""
     c, k, a = float(reading.direction), reading.velocity, reading.friction
     s = c * a
-    (
-        ss, sc, sk, sa, sb, sg, sn, su, cc, ck, ca, cb, cg, cn, cu,
-        kk, ka, kb, kg, kn, ku, aa, ab, ag, an, au,
-        bb, bg, bn, bu, _, gn, gu, nn, nu, uu,
-    ) = covariance  # fmt: skip
+    p = covariance
     return Terms(
-        s * ss + c * sc + k * sk + a * sa + sb + sn + c * su,
-        s * sc + c * cc + k * ck + a * ca + cb + cn + c * cu,
-        s * sk + c * ck + k * kk + a * ka + kb + kn + c * ku,
-        s * sa + c * ca + k * ka + a * aa + ab + an + c * au,
-        s * sb + c * cb + k * kb + a * ab + bb + bn + c * bu,
-        s * sg + c * cg + k * kg + a * ag + bg + gn + c * gu,
-        s * sn + c * cn + k * kn + a * an + bn + nn + c * nu,
-        s * su + c * cu + k * ku + a * au + bu + nu + c * uu,
+        s * p.ss + c * p.sc + k * p.sk + a * p.sa + p.sb + p.sn + c * p.su,
+        s * p.sc + c * p.cc + k * p.ck + a * p.ca + p.cb + p.cn + c * p.cu,
+        s * p.sk + c * p.ck + k * p.kk + a * p.ka + p.kb + p.kn + c * p.ku,
+        s * p.sa + c * p.ca + k * p.ka + a * p.aa + p.ab + p.an + c * p.au,
+        s * p.sb + c * p.cb + k * p.kb + a * p.ab + p.bb + p.bn + c * p.bu,
+        s * p.sg + c * p.cg + k * p.kg + a * p.ag + p.bg + p.gn + c * p.gu,
+        s * p.sn + c * p.cn + k * p.kn + a * p.an + p.bn + p.nn + c * p.nu,
+        s * p.su + c * p.cu + k * p.ku + a * p.au + p.bu + p.nu + c * p.uu,
     )
 
 
@@ -279,20 +275,17 @@ def _predicted(
     walk, gradient, remainder = moved * WALK * WALK, GRADIENT_WALK * law / longest, REMAINDER * law
     curved = abs(way) / longest if known.unexplained.drift_square > drift * drift else 0.0
     misfit = MISFIT * law
-    (
-        ss, sc, sk, sa, sb, sg, sn, su, cc, ck, ca, cb, cg, cn, cu,
-        kk, ka, kb, kg, kn, ku, aa, ab, ag, an, au,
-        bb, bg, bn, bu, gg, gn, gu, nn, nu, uu,
-    ) = known.covariance  # fmt: skip
+    p = known.covariance
     return Covariance(
-        ss + walk * SCALE_PRIOR * SCALE_PRIOR, sc, sk, sa, sb + way * sg, sg, kept * sn, fits * su,
-        cc + walk * coulomb * coulomb, ck, ca, cb + way * cg, cg, kept * cn, fits * cu,
-        kk + walk * viscous * viscous, ka, kb + way * kg, kg, kept * kn, fits * ku,
-        aa + walk * ASYMMETRY_PRIOR * ASYMMETRY_PRIOR, ab + way * ag, ag, kept * an, fits * au,
-        bb + way * (2.0 * bg + way * gg) + elapsed * offset * offset, bg + way * gg, kept * (bn + way * gn),
-        fits * (bu + way * gu), gg + curved * gradient * gradient, kept * gn, fits * gu,
-        kept * kept * nn + (1.0 - kept * kept) * remainder * remainder, kept * fits * nu,
-        fits * fits * uu + (1.0 - fits * fits) * misfit * misfit,
+        p.ss + walk * SCALE_PRIOR * SCALE_PRIOR, p.sc, p.sk, p.sa, p.sb + way * p.sg, p.sg, kept * p.sn, fits * p.su,
+        p.cc + walk * coulomb * coulomb, p.ck, p.ca, p.cb + way * p.cg, p.cg, kept * p.cn, fits * p.cu,
+        p.kk + walk * viscous * viscous, p.ka, p.kb + way * p.kg, p.kg, kept * p.kn, fits * p.ku,
+        p.aa + walk * ASYMMETRY_PRIOR * ASYMMETRY_PRIOR, p.ab + way * p.ag, p.ag, kept * p.an, fits * p.au,
+        p.bb + way * (2.0 * p.bg + way * p.gg) + elapsed * offset * offset, p.bg + way * p.gg,
+        kept * (p.bn + way * p.gn), fits * (p.bu + way * p.gu),
+        p.gg + curved * gradient * gradient, kept * p.gn, fits * p.gu,
+        kept * kept * p.nn + (1.0 - kept * kept) * remainder * remainder, kept * fits * p.nu,
+        fits * fits * p.uu + (1.0 - fits * fits) * misfit * misfit,
     )  # fmt: skip
 
 
@@ -311,9 +304,12 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
         strayed = known.strayed
     elif known.stroke > longest:
         longest = known.stroke
-    s, c, k, a, b, g, n, u = known.terms
-    offset = b + reading.way * g
-    terms = Terms(s, c, k, a, offset, g, kept * n, fits * u)
+    before = known.terms
+    offset = before.offset + reading.way * before.gradient
+    terms = Terms(
+        before.scale, before.coulomb, before.viscous, before.asymmetry, offset, before.gradient,
+        kept * before.remainder, fits * before.misfit,
+    )  # fmt: skip
     covariance = _predicted(known, reading, fits, elapsed, moved, stroke if stroke > longest else longest)
     innovation = reading.force - expected(terms, reading)
     usual = known.unexplained.usual
@@ -374,29 +370,26 @@ def _corrected(
     distance = abs(innovation) / math.sqrt(variance)
     if distance > OUTLIER:
         variance = spread + noise * noise * (distance / OUTLIER) * (distance / OUTLIER)
-    s, c, k, a, b, g, n, u = gains
-    sv, cv, kv, av, bv, gv, nv, uv = (
-        s / variance, c / variance, k / variance, a / variance, b / variance, g / variance, n / variance, u / variance,
+    s, c, k, a = gains.scale, gains.coulomb, gains.viscous, gains.asymmetry
+    b, g, n, u = gains.offset, gains.gradient, gains.remainder, gains.misfit
+    sv, cv, kv, av = s / variance, c / variance, k / variance, a / variance
+    bv, gv, nv, uv = b / variance, g / variance, n / variance, u / variance
+    p = covariance
+    corrected = Terms(
+        terms.scale + sv * innovation, terms.coulomb + cv * innovation, terms.viscous + kv * innovation,
+        terms.asymmetry + av * innovation, terms.offset + bv * innovation, terms.gradient + gv * innovation,
+        terms.remainder + nv * innovation, terms.misfit + uv * innovation,
     )  # fmt: skip
-    (
-        ss, sc, sk, sa, sb, sg, sn, su, cc, ck, ca, cb, cg, cn, cu,
-        kk, ka, kb, kg, kn, ku, aa, ab, ag, an, au,
-        bb, bg, bn, bu, gg, gn, gu, nn, nu, uu,
-    ) = covariance  # fmt: skip
-    scale, coulomb, viscous, asymmetry, offset, gradient, remainder, misfit = terms
-    terms = Terms(
-        scale + sv * innovation, coulomb + cv * innovation, viscous + kv * innovation, asymmetry + av * innovation,
-        offset + bv * innovation, gradient + gv * innovation, remainder + nv * innovation, misfit + uv * innovation,
-    )  # fmt: skip
-    return terms, Covariance(
-        ss - sv * s, sc - sv * c, sk - sv * k, sa - sv * a, sb - sv * b, sg - sv * g, sn - sv * n, su - sv * u,
-        cc - cv * c, ck - cv * k, ca - cv * a, cb - cv * b, cg - cv * g, cn - cv * n, cu - cv * u,
-        kk - kv * k, ka - kv * a, kb - kv * b, kg - kv * g, kn - kv * n, ku - kv * u,
-        aa - av * a, ab - av * b, ag - av * g, an - av * n, au - av * u,
-        bb - bv * b, bg - bv * g, bn - bv * n, bu - bv * u,
-        gg - gv * g, gn - gv * n, gu - gv * u,
-        nn - nv * n, nu - nv * u,
-        uu - uv * u,
+    return corrected, Covariance(
+        p.ss - sv * s, p.sc - sv * c, p.sk - sv * k, p.sa - sv * a,
+        p.sb - sv * b, p.sg - sv * g, p.sn - sv * n, p.su - sv * u,
+        p.cc - cv * c, p.ck - cv * k, p.ca - cv * a, p.cb - cv * b, p.cg - cv * g, p.cn - cv * n, p.cu - cv * u,
+        p.kk - kv * k, p.ka - kv * a, p.kb - kv * b, p.kg - kv * g, p.kn - kv * n, p.ku - kv * u,
+        p.aa - av * a, p.ab - av * b, p.ag - av * g, p.an - av * n, p.au - av * u,
+        p.bb - bv * b, p.bg - bv * g, p.bn - bv * n, p.bu - bv * u,
+        p.gg - gv * g, p.gn - gv * n, p.gu - gv * u,
+        p.nn - nv * n, p.nu - nv * u,
+        p.uu - uv * u,
     )  # fmt: skip
 
 
