@@ -1,5 +1,6 @@
 """Exported FMUs simulate what Python computes, and the exported C builds with clang, too."""
 
+import ctypes
 import dataclasses
 import math
 import re
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from fmpy import extract, read_model_description, simulate_fmu
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
@@ -129,6 +131,19 @@ def test_a_tool_accepts_and_simulates_the_fmu(exported):
         assert set(np.sign(found['friction_force'])) >= {-1.0, 1.0}, kind
 
 
+def test_a_refused_step_takes_no_time_and_no_token_makes_no_instance(exported):
+    model, path = exported
+    with running(path) as (fmu, variables):
+        fmu.doStep(0.5, STEP)
+        if model == 'estimator':
+            with pytest.raises(FMICallException):
+                fmu.doStep(-1.0, STEP)
+        assert got(fmu, variables, ['time']) == [0.5 + STEP]
+        function = fmu.dll[f'fmi{"2Instantiate" if isinstance(fmu, FMU2Slave) else "3InstantiateCoSimulation"}']
+        function.restype, function.argtypes = ctypes.c_void_p, None
+        assert function(*[None] * 12) is None
+
+
 def test_the_sources_in_the_fmu_build_with_clang_without_a_warning(exported):
     folder = Path(extract(exported[1])) / 'sources'
     clang = [sys.executable, '-m', 'ziglang', 'cc', '-std=c11', '-O0', '-Wall', '-Wextra', '-Werror', '-c']
@@ -136,11 +151,49 @@ def test_the_sources_in_the_fmu_build_with_clang_without_a_warning(exported):
         subprocess.run([*clang, file.name, '-o', f'{file.stem}.o'], cwd=folder, check=True)
 
 
-def test_the_controller_of_the_docs_compiles_against_stand_in_headers(tmp_path: Path):
+DRIVER = """
+#include "controller.cpp"
+#include <cstdio>
+
+struct Loop : FrictionCompensation {
+  Loop() {
+    on_init(), on_export_reference_interfaces(), on_activate({});
+    command_interfaces_.resize(1);
+    state_interfaces_ = {{0.05}, {3e6}, {1e6}};
+  }
+
+  void run(double effort, double velocity, int samples) {
+    for (int i = 0; i < samples; i++) {
+      if (!std::isnan(velocity)) reference_interfaces_ = {effort, velocity};
+      update_and_write_commands({now_ += 1000000}, {});
+    }
+    std::printf("%.17g\\n", command_interfaces_[0].value);
+  }
+
+  int64_t now_ = 0;
+};
+
+int main() {
+  Loop loop;
+  loop.run(NAN, NAN, 1);
+  loop.run(5.0, 0.05, 500);
+  loop.run(NAN, NAN, 500);
+}
+"""
+
+
+def test_the_controller_of_the_docs_adds_a_force_that_fades_when_upstream_stops(tmp_path: Path):
+    """Against stand-ins of the headers of ros2_control."""
     page = (ROOT / 'docs' / 'controllers.md').read_text()
     (source,) = (text for text in re.findall(r'```cpp\n(.*?)```', page, re.DOTALL) if 'seal_friction.h' in text)
-    (tmp_path / 'controller.cpp').write_text(source)
-    (tmp_path / 'seal_friction.h').write_text(sources(PARAMETERS, '{}', 'seal_friction')['seal_friction.h'])
+    files = {'controller.cpp': source, 'driver.cpp': DRIVER, **sources(PARAMETERS, '{}', 'seal_friction')}
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    subprocess.run(['cc', '-std=c11', '-O0', '-c', 'seal_friction.c'], cwd=tmp_path, check=True)
     headers = ROOT / 'test' / 'harness' / 'ros2_control'
-    check = ['c++', '-std=c++17', '-Wall', '-Wextra', '-Werror', '-fsyntax-only', '-I', str(headers), 'controller.cpp']
-    subprocess.run(check, cwd=tmp_path, check=True)
+    flags = ['-std=c++17', '-O0', '-Wall', '-Wextra', '-Werror', '-I', str(headers)]
+    subprocess.run(['c++', *flags, 'driver.cpp', 'seal_friction.o', '-o', 'driver'], cwd=tmp_path, check=True)
+    printed = subprocess.run(['./driver'], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
+    before, moving, stopped = map(float, printed.split())
+    assert (before, stopped) == (0.0, 5.0)  # [N]
+    assert moving > 6.0

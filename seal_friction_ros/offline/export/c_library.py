@@ -8,7 +8,7 @@ import hashlib
 import re
 import shutil
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import make_dataclass
 from pathlib import Path
 from string import Template
@@ -44,8 +44,8 @@ MESSAGES = tuple(kind for kind in get_args(Input) if kind is not Position)
 ANSWERS: Any = make_dataclass(
     'Answers',
     [one for kind in get_args(Output) for one in ((f'has_{snake(kind.__name__)}', bool), (snake(kind.__name__), kind))],
+    namespace={'__doc__': 'What one message or sample makes; an answer counts if its has_ is true.'},
 )
-"""What one message or sample makes: whether there is an answer of each kind, and the answer."""
 
 
 class Export(NamedTuple):
@@ -57,7 +57,7 @@ class Export(NamedTuple):
 
     def summary(self) -> str:
         """One line."""
-        built = 'libraries and examples are built' if self.is_built else 'not built, since there is no make or no cc'
+        built = 'libraries and examples are built' if self.is_built else 'not built, since there is no make, cc or c++'
         return f'{self.folder}: C library of configuration {self.hash[:12]}, {built}'
 
 
@@ -71,7 +71,7 @@ def export_c(configuration: Configuration, folder: Path, name: str = 'seal_frict
         samples: CSV of the examples; default: a second of a rod that goes to and fro.
 
     Raises:
-        ValueError: The name is no identifier of C, or a law cannot be translated.
+        ValueError: The name is no identifier of C, a law cannot be translated, or the compiler fails.
     """
     document = snapshot_text(first_snapshot(configuration))
     made = sources(configuration.parameters(), document, name) | {'example.csv': samples or example_samples()}
@@ -80,8 +80,16 @@ def export_c(configuration: Configuration, folder: Path, name: str = 'seal_frict
         (folder / file_name).write_text(text, encoding='utf-8')
     can_build = all(map(shutil.which, ('make', 'cc', 'c++')))
     if can_build:
-        subprocess.run(['make', '-s', '-C', str(folder), 'build'], check=True, capture_output=True)
+        build(['make', '-s', 'build'], folder)
     return Export(folder, digest(document), can_build)
+
+
+def build(command: Sequence[str], folder: Path) -> None:
+    """Run a compiler in a folder. ValueError: it fails, with the error that it tells first."""
+    ran = subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True, errors='replace')
+    said = ran.stderr.strip().splitlines() or [f'exit status {ran.returncode}']
+    if ran.returncode:
+        raise ValueError(f'{command[0]} fails: {next((x for x in said if "error" in x), said[0])}')
 
 
 def digest(document: str) -> str:
@@ -110,8 +118,8 @@ def samples_of(bag: Path) -> str:
 
 def sources(parameters: pipeline.PipelineParameters, document: str, name: str) -> dict[str, str]:
     """Text of each file but the samples; ``document`` is what ``configuration.json`` holds. ValueError as above."""
-    if not re.fullmatch(r'[a-z][a-z0-9_]{0,40}', name):
-        raise ValueError(f'--name {name}: give small letters, digits and underscores, a letter first')
+    if name == 'example' or not re.fullmatch(r'[a-z][a-z0-9_]{0,40}', name):
+        raise ValueError(f'--name {name}: give small letters, digits and underscores, a letter first; not example')
     try:
         values = {
             'name': name, 'NAME': name.upper(), 'mark': mark('export'), 'hash': digest(document),

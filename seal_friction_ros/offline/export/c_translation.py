@@ -111,7 +111,8 @@ class Translation:
         if key not in self._known:
             self._kept += [a.value for a in arguments if isinstance(a, Static)]
             body = _Body(self, function, arguments)
-            name = stem = f'{function.__module__.rpartition(".")[2]}_{function.__name__.strip("_")}'
+            module = function.__module__.rpartition('.')[2].capitalize()  # no --name begins with a capital
+            name = stem = f'{module}_{function.__name__.strip("_")}'
             lines, alike = body.lines(), 1
             while name in self._functions:
                 alike += 1
@@ -372,10 +373,8 @@ class _Body:
         is_real = float in (a.kind, b.kind)
         if a.kind not in SCALARS or b.kind not in SCALARS or kind not in (_REAL if is_real else {**_REAL, **_BITS}):
             raise UntranslatableError('an operator on what it is not for')
-        if is_real:
-            return Runtime(f'({a.code} {_REAL[kind]} {b.code})', float)
-        if kind is ast.Div:
-            return Runtime(f'((double){a.code} / (double){b.code})', float)
+        if is_real or kind is ast.Div:
+            return Runtime(f'({_real(a)} {_REAL[kind]} {_real(b)})', float)
         if kind in _BITS:
             return Runtime(f'({a.code} {_BITS[kind]} {b.code})', int)
         return Runtime(f'{_WHOLE[kind]}({_bare(a.code)}, {_bare(b.code)})', int)
@@ -551,6 +550,10 @@ def _mentions(value: Value, place: str) -> bool:
 
 def _zero(kind: Any) -> str:
     return '0' if kind in SCALARS or is_mutable(kind) else '{0}'
+
+
+def _real(value: Runtime) -> str:
+    return value.code if value.kind is float else f'(double){value.code}'
 
 
 def _negated(value: Value) -> Value:

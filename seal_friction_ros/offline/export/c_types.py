@@ -52,7 +52,8 @@ def meanings_of(kind: Any) -> dict[str, str]:
         source = inspect.getsource(kind)
     except (OSError, TypeError):  # a record that no source declares
         return {}
-    return dict(re.findall(r'^    (\w+): .*?  # (.*)$', source, re.MULTILINE))
+    found = re.findall(r'^    (\w+): .*?  # (.*)$', source, re.MULTILINE)
+    return {name: _comment(text) for name, text in found}
 
 
 def is_kind(kind: Any) -> bool:
@@ -145,4 +146,8 @@ class Types:
 
 def first_line(documented: Any) -> str:
     """First line of a docstring, as a comment of C can hold it."""
-    return (inspect.getdoc(documented) or '').partition('\n')[0].replace('*/', '* /').replace('`', '')
+    return _comment((inspect.getdoc(documented) or '').partition('\n')[0])
+
+
+def _comment(text: str) -> str:
+    return text.replace('*/', '* /').replace('`', '')

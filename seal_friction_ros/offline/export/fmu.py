@@ -3,13 +3,12 @@
 - ``estimator``: co-simulation; one step is one sample of `LoopSample`, at the time at which the step begins.
 - ``friction``: co-simulation and model exchange, without states: `friction_on_rod`.
 
-The binary is for this machine; the sources in the FMU are for all others.
+The binary is for this machine; the sources in the FMU are for other Linux machines.
 """
 
 import math
 import platform
 import shutil
-import subprocess
 import tempfile
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,7 +19,7 @@ from seal_friction_ros.core.estimation.configuration import Configuration, first
 from seal_friction_ros.core.estimation.loop import LoopSample, RodLoad
 from seal_friction_ros.core.friction.states import StateFriction
 from seal_friction_ros.core.messages.records import FeedForward, FrictionEstimate
-from seal_friction_ros.offline.export.c_library import digest, filled, sources
+from seal_friction_ros.offline.export.c_library import build, digest, filled, sources
 from seal_friction_ros.offline.export.c_types import fields_of, meanings_of, number
 
 PLATFORMS = {('2', 'x86_64'): 'linux64', ('3', 'x86_64'): 'x86_64-linux', ('3', 'aarch64'): 'aarch64-linux'}
@@ -80,7 +79,7 @@ def export_fmu(configuration: Configuration, fmu: Path, model: str = 'estimator'
         fmi: Version, ``2`` or ``3``.
 
     Raises:
-        ValueError: A law of the configuration cannot be translated.
+        ValueError: A law of the configuration cannot be translated, or the compiler fails.
     """
     document, name = snapshot_text(first_snapshot(configuration)), f'seal_{model}'
     library = sources(configuration.parameters(), document, name)
@@ -127,7 +126,7 @@ def _built(files: dict[str, str]) -> bytes:
             *inputs,
             '-lm',
         ]
-        subprocess.run(command, cwd=folder, check=True, capture_output=True)
+        build(command, Path(folder))
         return (Path(folder) / 'fmu.so').read_bytes()
 
 

@@ -6,6 +6,7 @@ import re
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -20,11 +21,12 @@ from seal_friction_ros.core.estimation.loop import LoopSample, RodLoad, friction
 from seal_friction_ros.core.estimation.pipeline import answered, init, is_tick_due
 from seal_friction_ros.core.friction.states import StateFriction
 from seal_friction_ros.core.messages.coder import decode, encode, type_of
-from seal_friction_ros.core.messages.records import Clock, Velocity, WatchdogTick, numbers_in
+from seal_friction_ros.core.messages.records import Clock, FrictionEstimate, Status, Velocity, WatchdogTick, numbers_in
 from seal_friction_ros.offline.bags.actuator_bag import first_snapshot as first_of_bag
 from seal_friction_ros.offline.bags.actuator_bag import open_actuator
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.export.c_library import digest, example_samples, sources
+from seal_friction_ros.offline.export.c_types import meanings_of
 from seal_friction_ros.offline.replay.replay import Replay
 
 BAGS = ('pull_test', 'faults')
@@ -124,8 +126,11 @@ def test_a_saved_state_goes_on_in_another_process_and_another_configuration_refu
     assert repr(fresh.known()) == repr(init(DEFAULT))
     assert fresh.call('load', saved, returns=ctypes.c_bool)
     assert repr(fresh.known()) == before
-    saved[0] += 1
-    assert not fresh.call('load', saved, returns=ctypes.c_bool)
+    assert int.from_bytes(saved[24:32], 'little') == size
+    for place in (0, 24):  # of the hash, and of the size of a layout
+        saved[place] += 1
+        assert not fresh.call('load', saved, returns=ctypes.c_bool)
+        saved[place] -= 1
 
 
 def test_the_watchdog_is_due_when_it_is_in_python(fresh: CEstimator):
@@ -194,11 +199,62 @@ def test_a_folder_of_somebody_else_a_name_that_c_does_not_take_and_no_seals_are_
     (tmp_path / 'mine.txt').write_text('mine')
     assert main(['export', 'c', 'delft_o_ring', '--out', str(tmp_path)]) == 2
     assert 'a folder but no C library' in capsys.readouterr().err
-    assert main(['export', 'c', 'delft_o_ring', '--name', 'my-lib', '--out', str(tmp_path / 'new')]) == 2
-    assert '--name my-lib' in capsys.readouterr().err
+    for name in ('my-lib', 'example'):
+        assert main(['export', 'c', 'delft_o_ring', '--name', name, '--out', str(tmp_path / 'new')]) == 2
+        assert f'--name {name}' in capsys.readouterr().err
     assert main(['export', 'c', '--out', str(tmp_path / 'new')]) == 2
     assert 'no seals' in capsys.readouterr().err
     assert not (tmp_path / 'new').exists()
+
+
+def test_a_compiler_that_fails_is_told_in_one_line(tmp_path: Path, capsys, monkeypatch):
+    (tmp_path / 'cc').write_text('#!/bin/sh\necho "cc: error: no space left" >&2\nexit 1\n')
+    (tmp_path / 'cc').chmod(0o755)
+    monkeypatch.setenv('PATH', str(tmp_path), prepend=':')
+    for kind in ('c', 'fmu'):
+        assert main(['export', kind, 'delft_o_ring', '--out', str(tmp_path / f'new.{kind}')]) == 2
+        assert 'fails: cc: error: no space left\n' in capsys.readouterr().err
+
+
+def test_a_library_named_like_a_module_compiles_with_all_warnings_but_not_for_inaccurate_numbers(tmp_path: Path):
+    made = sources(DEFAULT, '{}', 'pipeline')
+    for file in ('pipeline.c', 'pipeline.h'):
+        (tmp_path / file).write_text(made[file])
+    check = ['cc', '-std=c11', '-Wall', '-Wextra', '-Wconversion', '-Werror', '-fsyntax-only', 'pipeline.c']
+    subprocess.run(check, cwd=tmp_path, check=True)
+    refused = subprocess.run([*check, '-ffinite-math-only'], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert '#error' in refused.stderr
+    assert 'an answer counts if its has_ is true' in made['pipeline.h']
+
+
+def test_both_examples_read_stamps_as_numbers_and_refuse_those_out_of_bounds(exported: Path):
+    def ran(rows: str) -> set[tuple[int, str]]:
+        (exported / 'rows.csv').write_text(f'names\n{rows}')
+        programs = [[f'./example_{language}', 'rows.csv'] for language in ('c', 'cpp')]
+        runs = [subprocess.run(one, cwd=exported, capture_output=True, text=True, check=False) for one in programs]
+        return {(run.returncode, run.stdout.partition('\n')[2]) for run in runs}
+
+    plain = ran('1000000000,0.05,3e6,1e6,40.0\n1700000000000000001,0.05,,1e6\n')
+    assert len(plain) == 1
+    assert ran('1e9,0.05,3e6,1e6,40.0\n\n1700000000000000001,0.05,none,1e6\n') == plain
+    assert ran('-1,0.05,3e6,1e6\n') == {(1, '')}
+
+
+def test_a_stamp_that_goes_back_is_taken_with_its_status(fresh: CEstimator):
+    for stamp in (2_000_000, 1_000_000):
+        answers = fresh.step(LoopSample(stamp, 0.05, 3e6, 1e6))
+    (estimate,) = [one for one in (decode(*each) for each in answers) if isinstance(one, FrictionEstimate)]
+    assert estimate.status & Status.STAMP_NOT_INCREASING
+
+
+class Odd(NamedTuple):
+    """A record."""
+
+    force: float  # [N] `a*/b`
+
+
+def test_a_comment_of_a_member_stays_a_comment_in_c():
+    assert meanings_of(Odd) == {'force': '[N] a* /b'}
 
 
 def test_the_example_runs_clean_under_the_sanitizers(tmp_path: Path):

@@ -30,8 +30,8 @@ int main(int argc, char **argv)
     while (fgets(line, sizeof line, file)) {
         char *text = strchr(line, ',');
         if (!text) continue;
-        text++;
-        sample.stamp = strtoll(line, NULL, 10);
+        *text++ = '\0';
+        sample.stamp = strpbrk(line, ".eE") ? llround(strtod(line, NULL)) : strtoll(line, NULL, 10); /* 1e9, too */
         sample.velocity = next_of(&text);
         sample.pressure_a = next_of(&text);
         sample.pressure_b = next_of(&text);

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -14,10 +15,10 @@ class Estimator
 public:
     Estimator() { ${name}_init(&state_); }
 
-    ${name}_answers step(const ${name}_loop_sample & sample)
+    std::optional<${name}_answers> step(const ${name}_loop_sample & sample)
     {
-        ${name}_answers answers;
-        ${name}_step(&state_, &sample, &answers);
+        ${name}_answers answers{};
+        if (!${name}_step(&state_, &sample, &answers)) return std::nullopt;
         return answers;
     }
 
@@ -33,16 +34,23 @@ int main(int argc, char ** argv)
     Estimator estimator;
     std::printf("stamp,friction_force,coulomb_friction,coulomb_friction_std,state,status,feedforward_force\n");
     while (std::getline(file, line)) {
+        if (line.find(',') == std::string::npos) continue;
         std::istringstream cells(line);
         std::getline(cells, cell, ',');
-        const auto stamp = std::strtoll(cell.c_str(), nullptr, 10);
+        const bool is_real = cell.find_first_of(".eE") != std::string::npos;  // 1e9, too
+        const int64_t stamp = is_real ? std::llround(std::strtod(cell.c_str(), nullptr)) : std::strtoll(cell.c_str(), nullptr, 10);
         std::vector<double> v;
-        while (std::getline(cells, cell, ',')) v.push_back(cell.empty() ? NAN : std::strtod(cell.c_str(), nullptr));
+        while (std::getline(cells, cell, ',')) {
+            char * end;
+            const double value = std::strtod(cell.c_str(), &end);
+            v.push_back(end == cell.c_str() ? NAN : value);
+        }
         v.resize(7, NAN);
         const auto answers = estimator.step({stamp, v[0], v[1], v[2], v[3], v[4], v[5], v[6]});
-        const auto & found = answers.friction_estimate;
+        if (!answers) return 1;
+        const auto & found = answers->friction_estimate;
         std::printf("%" PRId64 ",%.17g,%.17g,%.17g,%" PRId64 ",%" PRId64 ",%.17g\n", found.stamp, found.friction_force,
                     found.coulomb_friction, found.coulomb_friction_std, found.state, found.status,
-                    answers.has_feed_forward ? answers.feed_forward.force : 0.0);
+                    answers->has_feed_forward ? answers->feed_forward.force : 0.0);
     }
 }

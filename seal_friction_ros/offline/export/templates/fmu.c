@@ -27,7 +27,7 @@ static int reset(instance *self)
 
 static instance *instantiate(const char *token)
 {
-    instance *self = strcmp(token, ${name}_hash()) == 0 ? malloc(sizeof *self) : NULL;
+    instance *self = token && strcmp(token, ${name}_hash()) == 0 ? malloc(sizeof *self) : NULL;
     if (self) reset(self);
     return self;
 }
@@ -79,10 +79,10 @@ static int set_reals(instance *self, const uint32_t *references, size_t n, const
 
 static int step(instance *self, double time, double size)
 {
-    self->time = time + size;
-    if (!ESTIMATOR) return OK;
     self->sample.stamp = isfinite(time) && fabs(time) < 1e9 ? llround(time * 1e9) : -1;
-    return ${name}_step(&self->state, &self->sample, &self->answers) ? OK : ERROR;
+    if (ESTIMATOR && !${name}_step(&self->state, &self->sample, &self->answers)) return ERROR;
+    self->time = time + size;
+    return OK;
 }
 
 /* What a tool may look for and nothing here needs: done, or not to be had. */
@@ -152,8 +152,9 @@ int fmi3DoStep(void *self, double time, double size, bool none_back, bool *event
 {
     (void)none_back;
     *event = *stop = *early = false;
-    *last = time + size;
-    return step(self, time, size);
+    const int status = step(self, time, size);
+    *last = status == OK ? time + size : time;
+    return status;
 }
 int fmi3SetTime(void *self, double time) { ((instance *)self)->time = time; return OK; }
 int fmi3CompletedIntegratorStep(void *self, bool none_back, bool *enter, bool *stop)

@@ -3,8 +3,11 @@
 #include <float.h>
 #include <math.h>
 #include <string.h>
-#if FLT_EVAL_METHOD != 0 || defined(__FAST_MATH__)
-#error "double must be IEEE double precision, without -ffast-math"
+#if FLT_EVAL_METHOD != 0 || defined(__FAST_MATH__) || __FINITE_MATH_ONLY__
+#error "double must be IEEE double precision, without -ffast-math and -ffinite-math-only"
+#endif
+#ifdef __clang__
+#pragma STDC FP_CONTRACT OFF
 #endif
 
 ${types}
@@ -67,15 +70,15 @@ ${name}_state_friction ${name}_friction_on_rod(${name}_rod_load load) { return $
 
 void ${name}_save(const ${name}_pipeline_state *state, uint8_t *bytes)
 {
-    uint8_t *at = bytes + 32;
-    memcpy(bytes, "${hash}", 32); /* half of it tells configurations apart */
+    uint8_t *at = put(bytes + 24, ${NAME}_STATE_SIZE);
+    memcpy(bytes, "${hash}", 24); /* these digits tell configurations apart, the size layouts of the state */
 ${save}
 }
 
 bool ${name}_load(${name}_pipeline_state *state, const uint8_t *bytes)
 {
-    const uint8_t *at = bytes + 32;
-    if (memcmp(bytes, "${hash}", 32) != 0) {
+    const uint8_t *at = bytes + 24;
+    if (memcmp(bytes, "${hash}", 24) != 0 || take(&at) != ${NAME}_STATE_SIZE) {
         return false;
     }
 ${load}

@@ -32,7 +32,8 @@ bool ${name}_is_tick_due(${name}_pipeline_state *state, int64_t now);
 /* Friction of the seals on a rod, without adaptation: for a simulated plant. */
 ${name}_state_friction ${name}_friction_on_rod(${name}_rod_load load);
 
-/* A state as ${NAME}_STATE_SIZE bytes, the same on every machine; load refuses those of another configuration. */
+/* A state as ${NAME}_STATE_SIZE bytes, the same on every machine. load reads as many, and refuses those of another
+ * configuration or layout. */
 void ${name}_save(const ${name}_pipeline_state *state, uint8_t *bytes);
 bool ${name}_load(${name}_pipeline_state *state, const uint8_t *bytes);
 

@@ -7,23 +7,32 @@
 #include <vector>
 
 namespace rclcpp {
-struct Time { int64_t nanoseconds() const; };
+struct Time {
+  int64_t value;
+  int64_t nanoseconds() const { return value; }
+};
 struct Duration {};
 }
 
 namespace rclcpp_lifecycle {
 struct State {};
-struct LifecycleNode { const char * get_name() const; };
+struct LifecycleNode { const char * get_name() const { return "friction"; } };
 }
 
 namespace hardware_interface {
 struct CommandInterface {
-  CommandInterface(const std::string & prefix, const std::string & name, double * value);
+  CommandInterface(const std::string &, const std::string &, double *) {}
   CommandInterface(const CommandInterface &) = delete;
   CommandInterface(CommandInterface &&) = default;
 };
-struct LoanedCommandInterface { template <typename T> bool set_value(const T & value); };
-struct LoanedStateInterface { double get_value() const; };
+struct LoanedCommandInterface {
+  double value;
+  template <typename T> bool set_value(const T & given) { value = given; return true; }
+};
+struct LoanedStateInterface {
+  double value;
+  double get_value() const { return value; }
+};
 }
 
 namespace controller_interface {
@@ -39,16 +48,16 @@ class ChainableControllerInterface {
 public:
   virtual ~ChainableControllerInterface() = default;
   virtual CallbackReturn on_init() = 0;
-  virtual CallbackReturn on_activate(const rclcpp_lifecycle::State & previous);
+  virtual CallbackReturn on_activate(const rclcpp_lifecycle::State &) { return CallbackReturn::SUCCESS; }
   virtual InterfaceConfiguration command_interface_configuration() const = 0;
   virtual InterfaceConfiguration state_interface_configuration() const = 0;
   virtual return_type update_and_write_commands(const rclcpp::Time & time, const rclcpp::Duration & period) = 0;
-  std::shared_ptr<rclcpp_lifecycle::LifecycleNode> get_node();
+  std::shared_ptr<rclcpp_lifecycle::LifecycleNode> get_node() { return std::make_shared<rclcpp_lifecycle::LifecycleNode>(); }
 
 protected:
-  virtual std::vector<hardware_interface::CommandInterface> on_export_reference_interfaces();
+  virtual std::vector<hardware_interface::CommandInterface> on_export_reference_interfaces() { return {}; }
   virtual return_type update_reference_from_subscribers(const rclcpp::Time & time, const rclcpp::Duration & period) = 0;
-  template <typename T> T auto_declare(const std::string & name, const T & value);
+  template <typename T> T auto_declare(const std::string &, const T & value) { return value; }
   std::vector<double> reference_interfaces_;
   std::vector<hardware_interface::LoanedCommandInterface> command_interfaces_;
   std::vector<hardware_interface::LoanedStateInterface> state_interfaces_;
