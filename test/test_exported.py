@@ -148,7 +148,11 @@ def test_the_sources_in_the_fmu_build_with_clang_without_a_warning(exported):
     folder = Path(extract(exported[1])) / 'sources'
     clang = [sys.executable, '-m', 'ziglang', 'cc', '-std=c11', '-O0', '-Wall', '-Wextra', '-Werror', '-c']
     for file in folder.glob('*.c'):
-        subprocess.run([*clang, file.name, '-o', f'{file.stem}.o'], cwd=folder, check=True)
+        made = subprocess.run(
+            [*clang, file.name, '-o', f'{file.stem}.o'], cwd=folder, capture_output=True, text=True, check=False
+        )
+        assert (made.returncode, made.stderr) == (0, '')
+        assert (folder / f'{file.stem}.o').stat().st_size > 0
 
 
 DRIVER = """

@@ -227,9 +227,10 @@ def test_with_the_estimator_the_loop_closes_and_what_was_recorded_verifies(tmp_p
     run = read_run(tmp_path / 'bag')
     status = run.status[1:]  # the clock is at 0 s, as before it came, when the first sample comes
     usual = int(Status.MOTION_UNCERTAIN)  # near rest, at reversals
-    busy = int(Status.MODEL_DISAGREES)  # a busy machine may take the messages of one sample in another order
-    assert np.bitwise_or.reduce(status) & ~busy == usual
-    assert np.count_nonzero(status[100:] & usual) <= 0.5 * len(status)  # most of the motion is told from rest
+    is_in_order = (run.input_age == 0.0).all()  # a busy machine may take the messages of a sample in another order:
+    other = 0 if is_in_order else int(Status.MODEL_DISAGREES)  # then the force sum is that of the sample before
+    assert np.bitwise_or.reduce(status) & ~other == usual
+    assert np.count_nonzero(status[100:] & usual) <= 0.3 * len(status)
     assert float(abs(run.feedforward_force[200:]).max()) == pytest.approx(SCALE * run.coulomb_friction.max(), rel=0.1)
 
 

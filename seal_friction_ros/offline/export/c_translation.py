@@ -492,18 +492,22 @@ class _Plain(ast.NodeTransformer):
     """Statements in their plain form: ``a += b`` as an assignment, a choice of tuples as a branch."""
 
     def visit_AugAssign(self, node: ast.AugAssign) -> ast.stmt:
+        """``a += b`` is ``a = a + b``."""
         return ast.Assign([node.target], ast.BinOp(_as_read(node.target), node.op, node.value))
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.stmt:
+        """The type is told by the value."""
         return ast.Assign([node.target], cast(ast.expr, node.value))
 
     def visit_Assign(self, node: ast.Assign) -> ast.stmt:
+        """A choice of tuples is a branch with an assignment each."""
         if isinstance(node.value, ast.IfExp) and isinstance(node.targets[0], ast.Tuple):
             body, otherwise = (ast.Assign(node.targets, each) for each in (node.value.body, node.value.orelse))
             return ast.If(node.value.test, [body], [otherwise])
         return node
 
     def visit_Return(self, node: ast.Return) -> ast.stmt:
+        """A choice of tuples is a branch with a return each."""
         if isinstance(node.value, ast.IfExp) and isinstance(node.value.body, ast.Tuple):
             return ast.If(node.value.test, [ast.Return(node.value.body)], [ast.Return(node.value.orelse)])
         return node

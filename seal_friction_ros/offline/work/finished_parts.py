@@ -108,6 +108,7 @@ def try_parts(
     outcomes, missing = _found(parts, kept)
 
     def keep(place: int, outcome: Outcome[Any]) -> None:
+        """Take the outcome of a missing part, and write it to the folder."""
         result: Any = outcome.result
         values = result._asdict() if hasattr(result, '_asdict') else result
         outcomes[missing[place]] = outcome._replace(result=values)
