@@ -177,6 +177,16 @@ ATTACKS: dict[str, Callable[[Rod], Rod]] = {
     'hum of 20 mm/s at 3 Hz on a held rod': held(
         lambda t: 0.02 * np.sin(6.0 * np.pi * t), lambda t: np.full_like(t, 0.4 * COULOMB)
     ),
+    **{
+        f'velocity zero of {zero * 1e3:g} mm/s': (lambda rod, zero=zero: replace(rod, velocity=rod.velocity + zero))
+        for zero in (0.0015, 0.003)
+    },
+    **{
+        f'velocity zero of 3 mm/s on a rod held under {share:g} of the friction': held(
+            lambda t: np.full_like(t, 3e-3), lambda t, share=share: np.full_like(t, share * COULOMB)
+        )
+        for share in (-0.5, 0.0)
+    },
     'vibration of 50 um at 300 Hz': vibrating(300.0, 5e-5),
     'vibration of 0.2 mm at 205 Hz': vibrating(205.0, 2e-4),
 }

@@ -7,6 +7,8 @@ QUICK = (
     'offset of the friction',
     'friction times 1.6',
     'direction: 15% more, 15% less',
+    'velocity zero of 3 mm/s on a rod held under 0 of the friction',
+    'velocity zero of 3 mm/s',
     'vibration of 50 um at 300 Hz',
 )
 

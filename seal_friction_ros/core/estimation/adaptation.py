@@ -20,10 +20,12 @@ from typing import NamedTuple
 from seal_friction_ros.core.estimation.friction_filter import (
     COULOMB_PRIOR,
     NOT_BEGUN,
+    OUTLIER,
     PROVEN,
     SCALE_PRIOR,
     FrictionFilter,
     Reading,
+    disregarded,
     friction_magnitude,
     updated,
 )
@@ -43,7 +45,7 @@ SETTLED = 0.99  # [-] of the friction, which its lagging value must have reached
 JUMPED = 1.1  # [-] of it that the lagging value must not exceed after a pressure that the law does not know
 LARGEST_INERTIA = 0.5  # [-] of the friction, in a reading with a known mass: the mass may be wrong
 LONGEST_STEP = 0.1  # [s] after a longer gap the acceleration starts anew
-LEARNING_INTERVAL = 9_500_000  # [ns] least time between two samples that are learnt from: all of a log at 100 Hz
+LEARNING_INTERVAL = 19_500_000  # [ns] least time between two samples that are learnt from: all of a log at 100 Hz
 LEAST_STD = 0.01  # [-] of the friction, below which no standard deviation is believed
 IMPLAUSIBLE = 5.0  # [-] innovation over its standard deviation that is a fault of its own
 WRONG_DIRECTION = 1.5  # [-] of the friction that a sample misses whose direction is wrong: it misses twice the friction
@@ -150,11 +152,13 @@ class Outlook(NamedTuple):
     unsteady_offset: float  # [N] with the remainder
     scale: float  # [-] friction over that of the law at the last reading, mean of both directions
     scale_std: float  # [-] negative: nothing is learnt
+    unexplained_square: float  # [N^2] of what readings show beside the friction and may be friction
 
 
 NO_OUTLOOK = Outlook(
-    is_proven=False, status=0, most=ANY, taken_off=0.0, offset=0.0, unsteady_offset=0.0, scale=1.0, scale_std=-1.0
-)
+    is_proven=False, status=0, most=ANY, taken_off=0.0, offset=0.0, unsteady_offset=0.0, scale=1.0, scale_std=-1.0,
+    unexplained_square=0.0,
+)  # fmt: skip
 
 
 class AdaptationState(NamedTuple):
@@ -199,6 +203,7 @@ class Slide(NamedTuple):
     is_pressed: bool  # whether the rod rests under the breakaway force
     is_usable: bool  # whether every input is good
     is_identified: bool  # whether the law was identified at this pressure and speed
+    may_rest: bool  # whether the velocity may be the zero of its sensor
 
 
 @compilable
@@ -234,17 +239,21 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     bias, known, strokes = state.bias, state.filter, state.strokes
     way = state.way + 0.5 * elapsed * (state.twice.velocity + twice.velocity)
     if slide.is_usable and direction != 0 and _is_even(settings, acceleration, at_first, friction):
+        is_outlier = False
         if slide.is_identified and known.stamp != NEVER:
             missed = _missed(state, newest) / known.innovation_std
             bias += elapsed / (elapsed + SHORT_TIME) * (between(-IMPLAUSIBLE, missed, IMPLAUSIBLE) - bias)
+            is_outlier = slide.may_rest and abs(missed) > OUTLIER
         most = JUMPED if slide.is_identified and not strokes.present.is_identified else math.inf
         if most * friction >= twice.friction * direction >= SETTLED * friction >= LEAST_FRICTION:
             force, law = twice.force_sum - settings.moving_mass * acceleration, twice.friction * direction
             reading = Reading(slide.stamp, force, direction, twice.velocity, way, law, slide.friction_std)
             strokes = _with_reading(strokes, reading, slide.is_identified)
-            if slide.is_identified:
+            if is_outlier:
+                known = disregarded(known, reading, elapsed)
+            elif slide.is_identified:
                 known, way = updated(known, reading), 0.0
-    outlook = outlook_of(settings, known, way, bias, acceleration)
+    outlook = outlook_of(settings, known, way, bias, acceleration, slide.may_rest)
     return AdaptationState(slide.stamp, once, twice, acceleration, way, bias, known, strokes, rest, outlook)
 
 
@@ -253,7 +262,7 @@ def _interrupted(settings: AdaptationSettings, state: AdaptationState, stamp: in
     """State after a gap: signals and strokes begin anew."""
     known, way, rest = state.filter, state.way, Rest(stamp, 0.0, 0.0, 0.0)
     strokes = Strokes(NO_STROKE, NO_STROKE, state.strokes.ratio, state.strokes.reversals)
-    outlook = outlook_of(settings, known, way, 0.0, 0.0)
+    outlook = outlook_of(settings, known, way, 0.0, 0.0, False)
     return AdaptationState(stamp, newest, newest, 0.0, way, 0.0, known, strokes, rest, outlook)
 
 
@@ -336,7 +345,7 @@ def _is_even(settings: AdaptationSettings, acceleration: float, newest: float, f
 
 @compilable
 def outlook_of(
-    settings: AdaptationSettings, known: FrictionFilter, way: float, bias: float, acceleration: float
+    settings: AdaptationSettings, known: FrictionFilter, way: float, bias: float, acceleration: float, may_rest: bool
 ) -> Outlook:
     """What the filter says of the next samples.
 
@@ -355,14 +364,16 @@ def outlook_of(
         return replace(NO_OUTLOOK, taken_off=inertia)
     friction, unexplained, terms = known.friction, known.unexplained, known.terms
     proven, wavers = known.friction_std <= PROVEN * friction, WAVERING * friction
-    most, lasting = IMPLAUSIBLE * known.innovation_std, LASTING_DRIFT if proven else UNPROVEN_DRIFT
+    most = (OUTLIER if may_rest else IMPLAUSIBLE) * known.innovation_std
+    lasting = LASTING_DRIFT if proven else UNPROVEN_DRIFT
     if settings.moving_mass == 0.0 and abs(acceleration) > settings.acceleration_max:
         wrong_direction = WRONG_DIRECTION * friction
         most = most if most > wrong_direction else wrong_direction
-    if abs(bias) > LASTING or abs(unexplained.drift) > lasting * friction:
+    offset = terms.offset + way * terms.gradient
+    may_be_at_rest = not proven and abs(offset + terms.remainder) > BAND_95 * known.friction_std
+    if may_be_at_rest or abs(bias) > LASTING or abs(unexplained.drift) > lasting * friction:
         most = -1.0
     is_unexplained = known.outliers.is_stepped or unexplained.drift_square > wavers * wavers
-    offset = terms.offset + way * terms.gradient
     return Outlook(
         proven,
         BITS.MODEL_DISAGREES if is_unexplained else 0,
@@ -372,6 +383,7 @@ def outlook_of(
         offset + terms.remainder,
         bounded_friction(settings, known, 0.0, known.speed, friction) / friction,
         known.friction_std / friction,
+        _unexplained_square(known),
     )
 
 
@@ -413,7 +425,7 @@ def friction_of_sliding(
     found = slope * law + terms.coulomb + terms.misfit + terms.viscous * speed
     found = found if found > 0.0 else 0.0
     sliding = found if lowest * law <= found <= highest * law else between(lowest * law, found, highest * law)
-    std = _std_of_sliding(known, speed, law, file_std)
+    std = _std_of_sliding(known, state.outlook.unexplained_square, speed, law, file_std)
     if uses and is_proven:
         at_no_speed = between(lowest * coulomb, slope * coulomb + terms.coulomb + terms.misfit, highest * coulomb)
         scale = sliding / law if law > 0.0 else 1.0
@@ -462,7 +474,7 @@ def friction_at_rest(
     scale = sliding / law if law > 0.0 else 1.0
     std = _std_at_rest(state, stamp, force_sum, scale * (coulomb + stiction))
     std = std if std > LEAST_STD * law else LEAST_STD * law
-    coulomb_std = _std_of_sliding(known, known.speed, law, file_std)
+    coulomb_std = _std_of_sliding(known, outlook.unexplained_square, known.speed, law, file_std)
     is_pressed, can_contradict = state.rest.pressed > LONGEST_PRESS, outlook.is_proven and law > 0.0
     if uses and outlook.is_proven:
         at_no_speed = bounded_friction(settings, known, 0.0, 0.0, coulomb)
@@ -500,17 +512,19 @@ def bounded_friction(
 
 
 @compilable
-def _std_of_sliding(known: FrictionFilter, speed: float, law: float, file_std: float) -> float:
+def _std_of_sliding(
+    known: FrictionFilter, unexplained_square: float, speed: float, law: float, file_std: float
+) -> float:
     """Standard deviation of the friction of a rod that slides [N].
 
-    Slow friction that nobody has seen may be Stribeck's.
+    Slow friction that nobody has seen may be Stribeck's; what is not explained [N^2] may be friction, too.
     """
     if known.stamp == NEVER:
         return math.sqrt(NEW_RUN * law * NEW_RUN * law + file_std * file_std)
     stribeck = STRIBECK * law * STRIBECK_SPEED / (STRIBECK_SPEED + speed)
     std = known.friction_std * (law / known.friction if law > known.friction else 1.0)
     least = LEAST_STD * law
-    std = math.sqrt(std * std + stribeck * stribeck + _unexplained_square(known))
+    std = math.sqrt(std * std + stribeck * stribeck + unexplained_square)
     return std if std > least else least
 
 

@@ -337,6 +337,7 @@ _NO_READING = _NO_STATE | _NO_FORCE_SUM
 _NO_FRICTION = ActuatorFriction(0.0, 0.0, 0.0, True, 0.0, 0.0)
 _UNKNOWN = StateFriction(UNKNOWN, 0, 0.0)
 
+ZERO_MAX = 5.0  # [-] our choice: zero of a velocity sensor over stick_velocity; a slower rod may be at rest
 CREEP = 0.1  # [-] our choice: a rod in the band of rest is known to be at rest up to this share of stick_velocity
 SETTLING_TIME = 0.01  # [s] our choice: in this time the way of a sliding rod exceeds the ripple of its signal clearly
 SHORTEST_INTERVAL = 1e-3  # [s] our choice: over less, noise exceeds any rate, and some drivers stamp no finer
@@ -436,6 +437,7 @@ def learn_from(
         stamp=seen.stamp, velocity=seen.velocity, force_sum=seen.force_sum,
         friction=friction.coulomb_friction + friction.velocity_friction, friction_std=friction.coulomb_friction_std,
         is_pressed=estimate.state == BREAKAWAY, is_usable=not status & ~_EXTRAPOLATED, is_identified=status == 0,
+        may_rest=abs(seen.velocity) < ZERO_MAX * parameters.settings.stick_velocity,
     )  # fmt: skip
     return adapt(parameters.adaptation, known, slide)
 

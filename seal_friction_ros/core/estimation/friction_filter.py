@@ -353,6 +353,19 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
 
 
 @compilable
+def disregarded(known: FrictionFilter, reading: Reading, elapsed: float) -> FrictionFilter:
+    """Filter after a reading that is far away and may be one of a rod at rest: nothing is learnt, but the band holds it.
+
+    Args:
+        known: Before the reading.
+        reading: What it shows.
+        elapsed: [s] that it stands for.
+    """
+    missed = reading.force - expected(known.terms, reading) + known.terms.remainder
+    return replace(known, unexplained=_followed(known, reading.friction, missed, 1.0, elapsed))
+
+
+@compilable
 def _corrected(
     terms: Terms, covariance: Covariance, gains: Terms, spread: float, innovation: float, noise: float
 ) -> tuple[Terms, Covariance]:

@@ -159,7 +159,7 @@ def test_at_rest_and_without_a_force_sum_there_is_no_residual(mode):
 
 LAW_AT_40 = ActuatorFriction(40.0, 4.0, 10.0, True, 0.0)
 SETTINGS = AdaptationSettings()
-EVEN = Slide(START, 0.02, 45.0, 40.0, 4.0, False, True, True)
+EVEN = Slide(START, 0.02, 45.0, 40.0, 4.0, False, True, True, False)
 """Even sliding at 45 N where the law says 40 N."""
 
 

@@ -110,7 +110,7 @@ def run_state(messages, parameters=PARAMETERS):
 def tick(stamp, speed=0.05, *, reference=True, velocity=True, pressure=3e6):
     """The messages of one moment, in the order a servo sends them."""
     yield Pressure(stamp, pressure, pressure)
-    yield Force(stamp, 100.0)
+    yield Force(stamp, math.copysign(40.0, speed))
     if reference:
         yield ServoReference(stamp, 0.0, speed, 0.0, b'reference')
     yield Position(stamp, 0.0)
