@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
     from dataclasses import asdict
 
     from seal_friction_ros.core.oring_contact.ring_friction import Reading
-    from seal_friction_ros.offline.contact.oring_runs import compute_file, seal_comment, seal_document
+    from seal_friction_ros.offline.contact.oring_runs import Task, compute_file, seal_comment, seal_document
     from seal_friction_ros.offline.contact.section_files import read_tension
     from seal_friction_ros.offline.contact.section_runs import Gland, case_of, mesh_levels, section_document
     from seal_friction_ros.offline.reports.oring_report import numbers_text, write_oring_report
@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
     pressures = sorted({0.0, *arguments.pressure})
     file = case_of(document, pressures, arguments.lines)
     readings = [Reading(*reading) for reading in arguments.reading]
-    computed = compute_file(file, Path(arguments.drawing), readings=readings, for_seal_file=True)
+    computed = compute_file(file, Path(arguments.drawing), Task(readings=readings, for_seal_file=True))
     levels = mesh_levels(computed)
     if arguments.report:
         write_oring_report(computed, arguments.report)

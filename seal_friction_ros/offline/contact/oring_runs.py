@@ -93,54 +93,32 @@ def sliding_contact(case: OringCase, result: OringResult) -> WallContact:
     return result.rod if case.geometry.sliding_wall == 'rod' else result.gland
 
 
-def compute_case(
-    path: Path,
-    pressures: Sequence[float] = (),
-    *,
-    readings: Sequence[Reading] = (),
-    law_from: Path | None = None,
-    for_seal_file: bool = False,
-    for_samples: bool = False,
-) -> Computed:
+class Task(NamedTuple):
+    """What to compute of a case."""
+
+    pressures: Sequence[float] = ()  # [Pa, gauge] increasing; empty: those in the file
+    readings: Sequence[Reading] = ()  # friction of one seal, to which the shear law is fitted
+    law_from: Path | None = None  # seal file of another ring, for its shear law instead of the friction of the case
+    for_seal_file: bool = False
+    """refuse a case without what `seal_document` needs, before computing; one without friction has `PRIOR`"""
+    for_samples: bool = False  # refuse a case in which nothing is unknown, before computing
+
+
+def compute_case(path: Path, task: Task | None = None) -> Computed:
     """Compute a case file, with a progress bar; its section and rubber may be in files beside it, see `with_files`.
 
     ValueError: the file is invalid or insufficient for a seal file, or the ring does not fit, does not seal or has no
     equilibrium.
-
-    Args:
-        path: The case file.
-        pressures: Increasing pressures instead of those in the file [Pa, gauge].
-        readings: Friction of one seal, to which the shear law is fitted.
-        law_from: Seal file of another ring whose shear law takes the place of the friction of the case.
-        for_seal_file: Refuse a case without what `seal_document` needs, before computing; one without friction has
-            `PRIOR`.
-        for_samples: Refuse a case in which nothing is unknown, before computing.
     """
     document = read_yaml(path)
     with named_errors(path):
         file = parse_oring_case(with_files(document, path.parent))
-    return compute_file(
-        file,
-        path,
-        pressures,
-        readings=readings,
-        law_from=law_from,
-        for_seal_file=for_seal_file,
-        for_samples=for_samples,
-    )
+    return compute_file(file, path, task)
 
 
-def compute_file(
-    file: OringCaseFile,
-    path: Path,
-    pressures: Sequence[float] = (),
-    *,
-    readings: Sequence[Reading] = (),
-    law_from: Path | None = None,
-    for_seal_file: bool = False,
-    for_samples: bool = False,
-) -> Computed:
+def compute_file(file: OringCaseFile, path: Path, task: Task | None = None) -> Computed:
     """Compute a parsed case, see `compute_case`; ``path`` names it in messages."""
+    pressures, readings, law_from, for_seal_file, for_samples = task or Task()
     with named_errors(path):
         wanted = tuple(pressures) or file.pressures
         check_pressures(file.case, wanted)
