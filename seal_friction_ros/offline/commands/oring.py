@@ -25,6 +25,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument('--reading', action='append', default=[], type=reading, metavar=metavar, help=help_text)
     help_text = 'seal file of another ring of the same rubber, wall and lubricant, for its shear law'
     cli.add_file(parser, '--law-from', 'seals', help_text, metavar='SEAL')
+    cli.add_film(parser)
     cli.add_target(parser, '--out', SEAL_FILE, metavar='SEAL.yaml', help='seal file to write')
     cli.add_page(parser, '--report', required=False)
     cli.add_shared(parser, '--uncertain', '--seed')
@@ -51,6 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
         law_from=config_path('seals', arguments.law_from) if arguments.law_from else None,
         for_seal_file=arguments.out is not None,
         for_samples=bool(samples),
+        fluid=arguments.film,
     )
     computed = compute_case(config_path('oring', arguments.case), task)
     numbers, text, uncertainty = cli.json_value(computed.summary), numbers_text(computed), None

@@ -23,6 +23,7 @@ def add_parser(commands: Any) -> None:
     reading = cli.quantities('Pa', 'm/s', 'N')
     text = 'measured sliding friction of one seal, in SI or with units; repeat it for several'
     parser.add_argument('--reading', action='append', default=[], type=reading, metavar=metavar, help=text)
+    cli.add_film(parser)
     cli.add_target(parser, '--out', SEAL_FILE, metavar='SEAL.yaml', help='seal file to write')
     cli.add_page(parser, '--report', required=False)
 
@@ -77,7 +78,9 @@ def run(arguments: argparse.Namespace) -> int:
     pressures = sorted({0.0, *arguments.pressure})
     file = case_of(document, pressures, arguments.lines)
     readings = [Reading(*reading) for reading in arguments.reading]
-    computed = compute_file(file, Path(arguments.drawing), Task(readings=readings, for_seal_file=True))
+    computed = compute_file(
+        file, Path(arguments.drawing), Task(readings=readings, for_seal_file=True, fluid=arguments.film)
+    )
     levels = mesh_levels(computed)
     if arguments.report:
         write_oring_report(computed, arguments.report)
