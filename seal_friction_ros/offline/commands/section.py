@@ -83,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
     )
     levels = mesh_levels(computed)
     if arguments.report:
-        write_oring_report(computed, arguments.report)
+        write_oring_report(computed, arguments.report, meshes=levels.text().strip())
     if arguments.out:
         write_seal(seal_document(computed), arguments.out, seal_comment(computed))
     numbers = cli.json_value(computed.summary) | {'mesh': levels._asdict()}

@@ -76,19 +76,26 @@ def _film_text(pressure: float, out: float | None, back: float | None, leakage: 
     text = f'  {pressure / BAR:8.2f} bar: film of a smooth seal'
     if out is None or back is None or leakage is None:
         return f'{text}: unknown, a lip ends at a corner or has too few nodes for its edge'
-    return f'{text} {out / UM:.3g} um out, {back / UM:.3g} um back, leakage {leakage / MM**2:.3g} mm3 per mm of stroke'
+    return f'{text} {out / UM:.3g} um out, {back / UM:.3g} um back, leakage {leakage / MM**3:.3g} mm3 per m of stroke'
 
 
 @house_style()
-def write_oring_report(computed: Computed, out: Path, uncertainty: Uncertainty | None = None) -> tuple[Path, ...]:
-    """Write the report of a computed case, with the ``uncertainty`` of its force from samples; see `write_page`."""
-    case = computed.file.case
+def write_oring_report(
+    computed: Computed, out: Path, uncertainty: Uncertainty | None = None, meshes: str = ''
+) -> tuple[Path, ...]:
+    """Write the report of a computed case, see `write_page`.
+
+    With the ``uncertainty`` of its force from samples, and what other ``meshes`` give in a line of text.
+    """
+    case, readings = computed.file.case, len(computed.task.readings)
+    measured = f'computed, readings: {readings}' if readings else 'computed, no measured data'
     return write_page(
         out,
         'oring',
         oring_figures(computed),
         verdict=_verdict(computed),
-        head=head_of(f'oring {case.name}', 'computed, no measured data', case.name),
+        head=head_of(f'{"oring" if case.section is None else "section"} {case.name}', measured, case.name),
+        meshes=meshes,
         file=computed.file,
         case=case,
         summary=computed.summary,
@@ -117,6 +124,8 @@ def _verdict(computed: Computed) -> Verdict:
         return Verdict(level, text, 'compute with more lines (numerics.lines of the case) and compare.')
     if not summary.friction_N:
         return Verdict(level, text, 'add a coefficient of friction to the case for friction.')
+    if computed.task.readings:
+        return Verdict(level, text, 'compare a reading at another pressure.')
     return Verdict(level, text, 'measure a few readings and compare: the modulus decides.')
 
 
@@ -191,7 +200,7 @@ def _film_table(computed: Computed) -> Table:
         ('pressure [bar]', lambda row: number(row[0], unit=BAR)),
         ('film out [um]', lambda row: number(row[1], 3, unit=UM)),
         ('film back [um]', lambda row: number(row[2], 3, unit=UM)),
-        ('leakage [mm3 per mm of stroke]', lambda row: number(row[3], unit=MM**2)),
+        ('leakage [mm3 per m of stroke]', lambda row: number(row[3], 2, unit=MM**3)),
     )
     return table_of(list(films), columns)
 

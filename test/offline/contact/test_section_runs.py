@@ -44,8 +44,17 @@ def test_a_drawing_becomes_a_seal_file_that_meets_its_reading(tmp_path: Path, ca
     differences = np.subtract(numbers['film_out_m'], numbers['film_back_m'])
     assert numbers['leakage_m3_per_m'] == pytest.approx(0.5 * differences * np.pi * 25.7e-3, rel=1e-3)
     assert 0.0 < numbers['mesh']['film_error'] < 0.2
-    table = next(table for table in checked_page(page).tables if 'film out [um]' in table[0])
-    assert [float(row[1]) for row in table[1:]] == pytest.approx(np.multiply(1e6, numbers['film_out_m']), rel=1e-2)
+    shown = checked_page(page)
+    assert shown.texts['h1'] == ['Seal ring']
+    assert any('meshes of 20, 29, 41 lines' in text for text in shown.texts['p'])
+    rows = next(table for table in shown.tables if 'film out [um]' in table[0])[1:]
+    table = np.char.replace(rows, '\N{MINUS SIGN}', '-').astype(float)
+    in_page = np.array([numbers['film_out_m'], numbers['film_back_m'], numbers['leakage_m3_per_m']]) * [
+        [1e6],
+        [1e6],
+        [1e9],
+    ]
+    assert table[:, 1:] == pytest.approx(in_page.T, abs=6e-3)
 
 
 def test_a_seal_that_ends_at_a_corner_says_so_instead_of_a_film(capsys: pytest.CaptureFixture[str]):
