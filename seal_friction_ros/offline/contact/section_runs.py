@@ -10,7 +10,7 @@ import numpy as np
 from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
 from seal_friction_ros.core.oring_contact.results import oring_results
-from seal_friction_ros.core.oring_contact.ring_friction import PRIOR, friction_of_contact
+from seal_friction_ros.core.oring_contact.ring_friction import DISCRETISATION, PRIOR, friction_of_contact
 from seal_friction_ros.core.oring_contact.section import SHAPES, Section, section_of_shape
 from seal_friction_ros.offline.contact.oring_runs import Computed, films_of, sliding_contact
 from seal_friction_ros.offline.contact.section_files import SUFFIXES, read_outline
@@ -18,7 +18,6 @@ from seal_friction_ros.offline.work.progress import progress
 
 _ROOM = 1.25  # default width of the groove over the length of the section (our choice)
 COARSER, FINER = 0.7, 1.4  # lines of the other two meshes over those of the case
-LARGEST_ERROR = 0.03  # [-] between the mesh of the case and the finer one, above which there is a warning (our choice)
 
 
 class Gland(NamedTuple):
@@ -46,7 +45,7 @@ class MeshLevels(NamedTuple):
         meshes = ', '.join(map(str, self.lines))
         text = f'  meshes of {meshes} lines: friction within {100.0 * self.error:.2g} % of the finest'
         text += '' if self.film_error is None else f', film within {100.0 * self.film_error:.2g} %'
-        return text if self.error <= LARGEST_ERROR else f'{text}: TOO MUCH, give more --lines'
+        return text if self.error <= DISCRETISATION else f'{text}: TOO MUCH, give more --lines'
 
 
 def section_document(
