@@ -75,18 +75,25 @@ def friction_law(
     """
     at = tuple(pressures)
     if isinstance(law, ShearLaw):
-        return ContactShear(law.shear_stress, law.exponent, at, sheared_areas(contacts, law.exponent))
+        return ContactShear(law.shear_stress, law.exponent, at, sheared_areas(at, contacts, law.exponent))
     return PhysicsBased(geometry, NormalForceTable(at, tuple(contact.force for contact in contacts)), law)
 
 
-def sheared_areas(contacts: Sequence[WallContact], exponent: float) -> tuple[float, ...]:
-    """`WallContact.sheared_area` over the pressure [m^2], without falls of `DISCRETISATION` or less.
+def sheared_areas(pressures: Sequence[float], contacts: Sequence[WallContact], exponent: float) -> tuple[float, ...]:
+    """`WallContact.sheared_area` over the pressure [Pa, gauge] without falls of `DISCRETISATION` or less [m^2].
 
-    Rubber under more pressure does not rub less.
+    Rubber under more pressure does not rub less. ValueError: it falls by more.
     """
     areas = np.array([contact.sheared_area(exponent) for contact in contacts])
     highest = np.maximum.accumulate(areas)
-    return tuple(np.where(areas >= (1.0 - DISCRETISATION) * highest, highest, areas).tolist())
+    share = areas / np.maximum(highest, np.finfo(float).tiny)
+    least = int(share.argmin())
+    if share[least] < 1.0 - DISCRETISATION:
+        raise ValueError(
+            f'friction falls with pressure, at {pressures[least]:.6g} Pa by {100.0 * (1.0 - share[least]):.2g} %: the '
+            'fluid passes a lip there, or its flank lifts off; a law needs pressures on one side of it'
+        )
+    return tuple(highest.tolist())
 
 
 def friction_after(seal: Seal) -> SealFriction:
@@ -139,7 +146,7 @@ def fit_shear_law(
 
     def shear_stresses(exponent: float) -> FloatArray:
         """Logarithm of friction over A_n of each reading."""
-        of_area = ContactShear(1.0, exponent, tuple(pressures), sheared_areas(contacts, exponent))
+        of_area = ContactShear(1.0, exponent, tuple(pressures), sheared_areas(pressures, contacts, exponent))
         return np.log(friction / [of_area.coulomb_friction(p) for p in at.tolist()])
 
     def cost(exponent: float) -> float:
