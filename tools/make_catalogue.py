@@ -10,7 +10,7 @@ from typing import Any
 
 from seal_friction_ros.core.foundation.units import BAR, INCH, MM
 from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
-from seal_friction_ros.offline.contact.oring_runs import compute_file, seal_comment, seal_document
+from seal_friction_ros.offline.contact.oring_runs import Task, compute_file, seal_comment, seal_document
 from seal_friction_ros.offline.work.seal_writer import write_seal
 
 FOLDER = Path(__file__).parents[1] / 'config' / 'seals' / 'catalogue'
@@ -89,7 +89,7 @@ def main() -> None:
     for document in documents:
         if len(sys.argv) < 2 or sys.argv[1] in document['name']:
             path = FOLDER / f'{document["name"]}.yaml'
-            computed = compute_file(parse_oring_case(document), path, for_seal_file=True)
+            computed = compute_file(parse_oring_case(document), path, Task(for_seal_file=True))
             comment = 'Made by tools/make_catalogue.py; see docs/seal_from_drawing.md.\n'
             write_seal(seal_document(computed), path, comment + seal_comment(computed).partition('\n')[2])
 

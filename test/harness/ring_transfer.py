@@ -2,9 +2,9 @@
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from paths import ROOT
@@ -12,6 +12,7 @@ from scipy.signal import savgol_filter
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.units import BAR
+from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
 from seal_friction_ros.core.oring_contact.results import WallContact, oring_results
 from seal_friction_ros.core.oring_contact.ring_friction import (
@@ -31,7 +32,7 @@ LOGS = [f'O-ring257_{run}{bar}bar.csv' for run in ('', 'run2_') for bar in (1, 3
 class Ring(NamedTuple):
     """A computed ring and readings of its friction."""
 
-    case: str
+    geometry: SealGeometry
     pressures: tuple[float, ...]  # [Pa] computed
     contacts: list[WallContact]
     readings: list[Reading]
@@ -43,8 +44,7 @@ class Ring(NamedTuple):
 
     def predicted(self, law: RingLaw) -> FloatArray:
         """Friction by a law at the pressure of each reading [N]."""
-        geometry = parse_oring_case(read_yaml(config_path('oring', self.case))).case.geometry
-        over_pressure = friction_law(law, geometry, self.pressures, self.contacts)
+        over_pressure = friction_law(law, self.geometry, self.pressures, self.contacts)
         return np.array([over_pressure.coulomb_friction(reading.pressure) for reading in self.readings])
 
     def normal_forces(self) -> FloatArray:
@@ -55,7 +55,12 @@ class Ring(NamedTuple):
 
 def ring_of(case: str, lines: int) -> Ring:
     """A case of the package with its own readings, on a mesh of ``lines``."""
-    file = parse_oring_case(read_yaml(config_path('oring', case)))
+    return computed_ring(read_yaml(config_path('oring', case)), lines)
+
+
+def computed_ring(document: Mapping[str, Any], lines: int) -> Ring:
+    """A case by its document, with its own readings, on a mesh of ``lines``."""
+    file = parse_oring_case(document)
     coarse = dataclasses.replace(file.case, numerics=dataclasses.replace(file.case.numerics, lines=lines))
     results = list(oring_results(coarse, file.pressures))
     measured = file.measured
@@ -64,7 +69,7 @@ def ring_of(case: str, lines: int) -> Ring:
         Reading(pressure, 0.01, friction / measured.seals)
         for pressure, friction in zip(measured.pressures, measured.frictions, strict=True)
     ]
-    return Ring(case, file.pressures, [sliding_contact(coarse, result) for result in results], readings)
+    return Ring(file.case.geometry, file.pressures, [sliding_contact(coarse, result) for result in results], readings)
 
 
 def fitted(ring: Ring, readings: Sequence[Reading], prior: RingLaw = PRIOR_LAW) -> RingLaw:
@@ -103,16 +108,33 @@ def of_others(deviations: FloatArray) -> FloatArray:
     return np.abs(deviations)[~np.eye(n, dtype=bool)].reshape(n, n - 1)
 
 
-def delft_reading(path: Path) -> Reading:
-    """Reading of a log: half the difference of both directions, sliding faster than 3 mm/s."""
+def delft_log(path: Path, bore: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Samples of a log, its velocity [m/s] and force sum [N] with the area of a ``bore`` [m]."""
     table = np.loadtxt(path)[15:]
     step = float(np.median(np.diff(table[:, 0]))) * 1e-3  # [s]
     velocity = savgol_filter(table[:, 4] * 1e-3, round(0.2 / step) | 1, 2, deriv=1, delta=step)
-    force = table[:, 5] * BAR * math.pi / 4.0 * 0.0257**2 - table[:, 6]
+    return table, velocity, table[:, 5] * BAR * math.pi / 4.0 * bore**2 - table[:, 6]
+
+
+def delft_reading(path: Path, bore: float = 0.0257) -> Reading:
+    """Reading of a log: half the difference of both directions, sliding faster than 3 mm/s."""
+    table, velocity, force = delft_log(path, bore)
     extends, retracts = velocity < -3e-3, velocity > 3e-3
     slides = extends | retracts
     friction = 0.5 * float(force[extends].mean() - force[retracts].mean())
     return Reading(float(np.median(table[slides, 5])) * BAR, float(np.median(np.abs(velocity[slides]))), friction)
+
+
+def frictions_of_cycles(path: Path, low: float, high: float) -> FloatArray:
+    """Friction of each cycle of a log [N] where the position is ``low`` to ``high`` [mm], as in `delft_reading`."""
+    table, velocity, force = delft_log(path, 0.0257)
+    direction = np.where(np.abs(velocity) > 3e-3, np.sign(velocity), 0.0)
+    moving = np.flatnonzero(direction)
+    strokes = np.split(moving, np.flatnonzero(np.diff(direction[moving])) + 1)
+    there = (table[:, 4] >= low) & (table[:, 4] < high)
+    means = np.array([force[stroke[there[stroke]]].mean() for stroke in strokes if there[stroke].sum() > 5])
+    pairs = means[: len(means) // 2 * 2].reshape(-1, 2)
+    return 0.5 * np.abs(pairs[:, 0] - pairs[:, 1])
 
 
 def summary(deviations: FloatArray) -> dict[str, float]:

@@ -22,12 +22,12 @@ from seal_friction_ros.core.lubrication.model import (
 )
 from seal_friction_ros.core.lubrication.oring_film import oring_film
 from seal_friction_ros.core.lubrication.shear import real_area_share
+from seal_friction_ros.core.oring_contact.ring_friction import DISCRETISATION
 
 _PASSAGES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0, 100.0, math.inf)  # steps to the steady film
 _MOST_RETRIES = 20
 _MEMORY_STEPS = 200
 _LONG_PASSAGES = 250.0  # a step of so many is nearly one to the steady film
-DISCRETISATION = 0.03  # [-] of the friction: what counts as an error of mesh and grid (our choice)
 PERCOLATION = 0.42
 """[-] real contact above which the contact leaves the lubricant no way through.
 

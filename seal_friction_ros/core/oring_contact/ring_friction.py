@@ -22,6 +22,7 @@ ONE_READING_STD = 0.15  # [-] scatter of readings: the same ring mounted anew di
 READINGS_OF_SCATTER = 4.0  # readings that `ONE_READING_STD` counts as, beside the scatter that is found (our choice)
 EXPONENT_STD = 0.1  # [-] of the exponent about that of the prior law (our choice)
 NO_READING_STD = 2.0  # [-] a factor of 3: the law of one ring is that far off on one of other rubber, wall, lubricant
+DISCRETISATION = 0.03  # [-] of the friction: what counts as an error of mesh and grid (our choice)
 BEYOND = 1.1  # share of the last computed pressure up to which a reading may lie
 
 RingLaw = FrictionCoefficientLaw | ShearLaw
@@ -74,9 +75,25 @@ def friction_law(
     """
     at = tuple(pressures)
     if isinstance(law, ShearLaw):
-        areas = tuple(contact.sheared_area(law.exponent) for contact in contacts)
-        return ContactShear(law.shear_stress, law.exponent, at, areas)
+        return ContactShear(law.shear_stress, law.exponent, at, sheared_areas(at, contacts, law.exponent))
     return PhysicsBased(geometry, NormalForceTable(at, tuple(contact.force for contact in contacts)), law)
+
+
+def sheared_areas(pressures: Sequence[float], contacts: Sequence[WallContact], exponent: float) -> tuple[float, ...]:
+    """`WallContact.sheared_area` over the pressure [Pa, gauge] without falls of `DISCRETISATION` or less [m^2].
+
+    Rubber under more pressure does not rub less. ValueError: it falls by more.
+    """
+    areas = np.array([contact.sheared_area(exponent) for contact in contacts])
+    highest = np.maximum.accumulate(areas)
+    share = areas / np.maximum(highest, np.finfo(float).tiny)
+    least = int(share.argmin())
+    if share[least] < 1.0 - DISCRETISATION:
+        raise ValueError(
+            f'friction falls with pressure, at {pressures[least]:.6g} Pa by {100.0 * (1.0 - share[least]):.2g} %: the '
+            'fluid passes a lip there, or its flank lifts off; a law needs pressures on one side of it'
+        )
+    return tuple(highest.tolist())
 
 
 def friction_after(seal: Seal) -> SealFriction:
@@ -129,8 +146,7 @@ def fit_shear_law(
 
     def shear_stresses(exponent: float) -> FloatArray:
         """Logarithm of friction over A_n of each reading."""
-        areas = tuple(contact.sheared_area(exponent) for contact in contacts)
-        of_area = ContactShear(1.0, exponent, tuple(pressures), areas)
+        of_area = ContactShear(1.0, exponent, tuple(pressures), sheared_areas(pressures, contacts, exponent))
         return np.log(friction / [of_area.coulomb_friction(p) for p in at.tolist()])
 
     def cost(exponent: float) -> float:

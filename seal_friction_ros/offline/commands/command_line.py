@@ -269,6 +269,12 @@ def positive(text: str) -> float:
     return float(text)
 
 
+def add_film(parser: Any) -> None:
+    """Add the fluid under a seal."""
+    help_text = 'viscosity [Pa s] and speed: film of each direction and leakage, as of a smooth seal'
+    parser.add_argument('--film', type=quantities('Pa s', 'm/s'), metavar='VISCOSITY,SPEED', help=help_text)
+
+
 def quantities(*units: str) -> Callable[[str], tuple[float, ...]]:
     """Type of an option: numbers in SI or with a unit, separated by commas, one for each of these ``units`` of SI."""
 

@@ -25,6 +25,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument('--reading', action='append', default=[], type=reading, metavar=metavar, help=help_text)
     help_text = 'seal file of another ring of the same rubber, wall and lubricant, for its shear law'
     cli.add_file(parser, '--law-from', 'seals', help_text, metavar='SEAL')
+    cli.add_film(parser)
     cli.add_target(parser, '--out', SEAL_FILE, metavar='SEAL.yaml', help='seal file to write')
     cli.add_page(parser, '--report', required=False)
     cli.add_shared(parser, '--uncertain', '--seed')
@@ -36,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Compute, and write seal file and page."""
     from seal_friction_ros.core.oring_contact.ring_friction import Reading
     from seal_friction_ros.files import config_path
-    from seal_friction_ros.offline.contact.oring_runs import compute_case, seal_comment, seal_document
+    from seal_friction_ros.offline.contact.oring_runs import Task, compute_case, seal_comment, seal_document
     from seal_friction_ros.offline.reports.oring_report import numbers_text, write_oring_report
     from seal_friction_ros.offline.work.seal_writer import write_seal
 
@@ -45,14 +46,15 @@ def run(arguments: argparse.Namespace) -> int:
         cli.check_only_for(arguments, ('workers', 'scheduler', 'work'), '--uncertain N')
     elif arguments.reading:
         raise ValueError('--uncertain is for a ring without a --reading, which leaves its own deviation')
-    computed = compute_case(
-        config_path('oring', arguments.case),
+    task = Task(
         arguments.pressures,
         readings=[Reading(*reading) for reading in arguments.reading],
         law_from=config_path('seals', arguments.law_from) if arguments.law_from else None,
         for_seal_file=arguments.out is not None,
         for_samples=bool(samples),
+        fluid=arguments.film,
     )
+    computed = compute_case(config_path('oring', arguments.case), task)
     numbers, text, uncertainty = cli.json_value(computed.summary), numbers_text(computed), None
     if samples:
         from seal_friction_ros.offline.contact.sampling import uncertain_ring

@@ -23,6 +23,7 @@ def add_parser(commands: Any) -> None:
     reading = cli.quantities('Pa', 'm/s', 'N')
     text = 'measured sliding friction of one seal, in SI or with units; repeat it for several'
     parser.add_argument('--reading', action='append', default=[], type=reading, metavar=metavar, help=text)
+    cli.add_film(parser)
     cli.add_target(parser, '--out', SEAL_FILE, metavar='SEAL.yaml', help='seal file to write')
     cli.add_page(parser, '--report', required=False)
 
@@ -61,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
     from dataclasses import asdict
 
     from seal_friction_ros.core.oring_contact.ring_friction import Reading
-    from seal_friction_ros.offline.contact.oring_runs import compute_file, seal_comment, seal_document
+    from seal_friction_ros.offline.contact.oring_runs import Task, compute_file, seal_comment, seal_document
     from seal_friction_ros.offline.contact.section_files import read_tension
     from seal_friction_ros.offline.contact.section_runs import Gland, case_of, mesh_levels, section_document
     from seal_friction_ros.offline.reports.oring_report import numbers_text, write_oring_report
@@ -77,10 +78,12 @@ def run(arguments: argparse.Namespace) -> int:
     pressures = sorted({0.0, *arguments.pressure})
     file = case_of(document, pressures, arguments.lines)
     readings = [Reading(*reading) for reading in arguments.reading]
-    computed = compute_file(file, Path(arguments.drawing), readings=readings, for_seal_file=True)
+    computed = compute_file(
+        file, Path(arguments.drawing), Task(readings=readings, for_seal_file=True, fluid=arguments.film)
+    )
     levels = mesh_levels(computed)
     if arguments.report:
-        write_oring_report(computed, arguments.report)
+        write_oring_report(computed, arguments.report, meshes=levels.text().strip())
     if arguments.out:
         write_seal(seal_document(computed), arguments.out, seal_comment(computed))
     numbers = cli.json_value(computed.summary) | {'mesh': levels._asdict()}

@@ -26,6 +26,7 @@ from seal_friction_ros.core.oring_contact.ring_friction import (
     friction_law,
     friction_of_contact,
 )
+from seal_friction_ros.core.oring_contact.sealing_film import SealFilm, seal_film
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.contact.section_files import with_files
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty as Spread
@@ -65,9 +66,24 @@ class OringSummary:
     shear_exponent: float | None
     friction_relative_std: float | None
     reading_deviations: tuple[float, ...]  # friction of the law over each reading, less one
+    film_out_m: tuple[float | None, ...]  # film of a smooth seal, see `SealFilm`; empty without a fluid
+    film_back_m: tuple[float | None, ...]
+    leakage_m3_per_m: tuple[float | None, ...]
     rod_profile: tuple[Profile, ...]
     gland_profile: tuple[Profile, ...]
     wall_profile: tuple[Profile, ...]  # downstream wall; empty without pressure
+
+
+class Task(NamedTuple):
+    """What to compute of a case."""
+
+    pressures: Sequence[float] = ()  # [Pa, gauge] increasing; empty: those in the file
+    readings: Sequence[Reading] = ()  # friction of one seal, to which the shear law is fitted
+    law_from: Path | None = None  # seal file of another ring, for its shear law instead of the friction of the case
+    for_seal_file: bool = False
+    """refuse a case without what `seal_document` needs, before computing; one without friction has `PRIOR`"""
+    for_samples: bool = False  # refuse a case in which nothing is unknown, before computing
+    fluid: tuple[float, float] | None = None  # viscosity [Pa s] and speed [m/s], for the film
 
 
 class Computed(NamedTuple):
@@ -76,7 +92,7 @@ class Computed(NamedTuple):
     file: OringCaseFile  # its friction is the one in use: of the case, of another seal, or of readings
     results: tuple[OringResult, ...]
     summary: OringSummary
-    readings: tuple[Reading, ...] = ()
+    task: Task
 
     @property
     def friction_law(self) -> FrictionLaw | None:
@@ -93,64 +109,34 @@ def sliding_contact(case: OringCase, result: OringResult) -> WallContact:
     return result.rod if case.geometry.sliding_wall == 'rod' else result.gland
 
 
-def compute_case(
-    path: Path,
-    pressures: Sequence[float] = (),
-    *,
-    readings: Sequence[Reading] = (),
-    law_from: Path | None = None,
-    for_seal_file: bool = False,
-    for_samples: bool = False,
-) -> Computed:
+def compute_case(path: Path, task: Task | None = None) -> Computed:
     """Compute a case file, with a progress bar; its section and rubber may be in files beside it, see `with_files`.
 
     ValueError: the file is invalid or insufficient for a seal file, or the ring does not fit, does not seal or has no
     equilibrium.
-
-    Args:
-        path: The case file.
-        pressures: Increasing pressures instead of those in the file [Pa, gauge].
-        readings: Friction of one seal, to which the shear law is fitted.
-        law_from: Seal file of another ring whose shear law takes the place of the friction of the case.
-        for_seal_file: Refuse a case without what `seal_document` needs, before computing; one without friction has
-            `PRIOR`.
-        for_samples: Refuse a case in which nothing is unknown, before computing.
     """
     document = read_yaml(path)
     with named_errors(path):
         file = parse_oring_case(with_files(document, path.parent))
-    return compute_file(
-        file,
-        path,
-        pressures,
-        readings=readings,
-        law_from=law_from,
-        for_seal_file=for_seal_file,
-        for_samples=for_samples,
-    )
+    return compute_file(file, path, task)
 
 
-def compute_file(
-    file: OringCaseFile,
-    path: Path,
-    pressures: Sequence[float] = (),
-    *,
-    readings: Sequence[Reading] = (),
-    law_from: Path | None = None,
-    for_seal_file: bool = False,
-    for_samples: bool = False,
-) -> Computed:
+def compute_file(file: OringCaseFile, path: Path, task: Task | None = None) -> Computed:
     """Compute a parsed case, see `compute_case`; ``path`` names it in messages."""
+    task = task or Task()
+    readings = task.readings
     with named_errors(path):
-        wanted = tuple(pressures) or file.pressures
+        wanted = tuple(task.pressures) or file.pressures
         check_pressures(file.case, wanted)
-        if (for_seal_file or readings) and len(wanted) < 2:
+        if task.fluid is not None and min(task.fluid) <= 0.0:
+            raise ValueError(f'case {file.case.name}: a film needs a viscosity and a speed above 0, not {task.fluid}')
+        if (task.for_seal_file or readings) and len(wanted) < 2:
             raise ValueError(f'case {file.case.name}: a law over pressure needs two pressures at least')
-        if law_from is not None:
-            file = dataclasses.replace(file, friction=friction_after(parse_seal(read_yaml(law_from))))
-        elif file.friction is None and (for_seal_file or readings):
+        if task.law_from is not None:
+            file = dataclasses.replace(file, friction=friction_after(parse_seal(read_yaml(task.law_from))))
+        elif file.friction is None and (task.for_seal_file or readings):
             file = dataclasses.replace(file, friction=PRIOR)
-        if for_samples:
+        if task.for_samples:
             check_unknown(file.case.name, file.unknown)
         results = []
         with progress(f'{file.case.name}: pressures', len(wanted)) as advance:
@@ -163,7 +149,8 @@ def compute_file(
         friction = dataclasses.replace(known, law=fitted.law, uncertainty=Uncertainty(fitted.relative_std))
         file = dataclasses.replace(file, friction=friction)
     deviations = () if fitted is None else tuple(fitted.deviations.tolist())
-    return Computed(file, tuple(results), _summary(file, results, deviations), tuple(readings))
+    films = films_of(file.case, results, task.fluid)
+    return Computed(file, tuple(results), _summary(file, results, deviations, films), task)
 
 
 def _fitted(file: OringCaseFile, results: Sequence[OringResult], readings: Sequence[Reading]) -> FittedShear:
@@ -174,7 +161,26 @@ def _fitted(file: OringCaseFile, results: Sequence[OringResult], readings: Seque
     return fit_shear_law(prior, [result.pressure for result in results], contacts, readings)
 
 
-def _summary(file: OringCaseFile, results: Sequence[OringResult], deviations: tuple[float, ...]) -> OringSummary:
+def films_of(
+    case: OringCase, results: Sequence[OringResult], fluid: tuple[float, float] | None
+) -> tuple[SealFilm | None, ...]:
+    """Film under the seal at each pressure, by viscosity [Pa s] and speed [m/s]; empty without a ``fluid``.
+
+    A cap lies on the sliding wall, so its modulus counts.
+    """
+    if fluid is None:
+        return ()
+    face = case.cap or case.rubber
+    elasticity = 4.0 / 3.0 * face.elastic_modulus, case.numerics.transition * case.rubber.elastic_modulus
+    return tuple(seal_film(sliding_contact(case, one), one.pressure, elasticity, fluid) for one in results)
+
+
+def _summary(
+    file: OringCaseFile,
+    results: Sequence[OringResult],
+    deviations: tuple[float, ...],
+    films: Sequence[SealFilm | None],
+) -> OringSummary:
     geometry, contacts = file.case.geometry, [sliding_contact(file.case, result) for result in results]
     normal = tuple(contact.force for contact in contacts)
     axial = tuple(result.axial_force for result in results)
@@ -198,6 +204,9 @@ def _summary(file: OringCaseFile, results: Sequence[OringResult], deviations: tu
         shear_exponent=shear.exponent if shear else None,
         friction_relative_std=friction.uncertainty.relative_std if friction else None,
         reading_deviations=deviations,
+        film_out_m=tuple(film and film.out for film in films),
+        film_back_m=tuple(film and film.back for film in films),
+        leakage_m3_per_m=tuple(film and film.leakage for film in films),
         rod_profile=tuple(_profile(result.rod) for result in results),
         gland_profile=tuple(_profile(result.gland) for result in results),
         wall_profile=tuple(_profile(result.wall) for result in results),
@@ -219,9 +228,9 @@ def seal_document(computed: Computed, spread: Spread | None = None) -> dict[str,
         raise ValueError(f'case {file.case.name}: a seal file needs a friction law and two pressures at least')
     found = friction.uncertainty.relative_std if spread is None else spread.relative_std
     pressures = [rounded(value, DIGITS) for value in computed.summary.pressure_Pa]
-    readings = f' Shear law: {len(computed.readings)} readings of this ring.' if computed.readings else ''
+    readings = f' Shear law: {len(computed.task.readings)} readings of this ring.' if computed.task.readings else ''
     source = f'{file.source} Contact: finite elements, {file.case.numerics.lines} lines.{readings}'
-    speeds = [reading.speed for reading in computed.readings]
+    speeds = [reading.speed for reading in computed.task.readings]
     return {
         'name': file.case.name,
         'source': ' '.join(source.split()),

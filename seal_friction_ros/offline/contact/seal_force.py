@@ -52,11 +52,12 @@ def seal_of(path: Path) -> Seal:
     document = read_yaml(path)
     if isinstance(document, dict) and 'groove' in document:
         from seal_friction_ros.offline.contact.oring_runs import (  # noqa: PLC0415  loads scipy
+            Task,
             compute_case,
             seal_document,
         )
 
-        document = seal_document(compute_case(path, for_seal_file=True))
+        document = seal_document(compute_case(path, Task(for_seal_file=True)))
     with named_errors(path):
         return parse_seal(document)
 

@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 
 from seal_friction_ros.core.estimation.findings import GOOD, Verdict, between, percent, worst
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.units import BAR, INCH, LBF, MM, MPA, PSI
+from seal_friction_ros.core.foundation.units import BAR, INCH, LBF, MM, MPA, PSI, UM
 from seal_friction_ros.core.friction.geometry import projected_area, squeeze, stretch
 from seal_friction_ros.core.oring_contact.oring_case import gland_fill
 from seal_friction_ros.core.oring_contact.oring_case_file import MeasuredFriction
@@ -53,6 +53,8 @@ def numbers_text(computed: Computed) -> str:
         )
     if summary.friction_N is not None:
         lines.append(_friction_text(computed, summary.friction_N))
+    films = zip(summary.pressure_Pa, summary.film_out_m, summary.film_back_m, summary.leakage_m3_per_m, strict=False)
+    lines += [_film_text(*film) for film in films]
     return '\n'.join(lines)
 
 
@@ -64,22 +66,36 @@ def _friction_text(computed: Computed, frictions: Sequence[float]) -> str:
         stress = f'shear stress at 1 MPa {summary.shear_stress_Pa / MPA:.3g} MPa'
         text += f', {stress}, exponent {summary.shear_exponent:.3g}'
     text += f', relative_std {summary.friction_relative_std:.2g}'
-    if computed.readings:
+    if computed.task.readings:
         largest = max(map(abs, summary.reading_deviations))
-        return f'{text}; {len(computed.readings)} readings, within {100.0 * largest:.1f} %'
+        return f'{text}; {len(computed.task.readings)} readings, within {100.0 * largest:.1f} %'
     return f'{text}; a --reading makes it your seal'
 
 
+def _film_text(pressure: float, out: float | None, back: float | None, leakage: float | None) -> str:
+    text = f'  {pressure / BAR:8.2f} bar: film of a smooth seal'
+    if out is None or back is None or leakage is None:
+        return f'{text}: unknown, a lip ends at a corner or has too few nodes for its edge'
+    return f'{text} {out / UM:.3g} um out, {back / UM:.3g} um back, leakage {leakage / MM**3:.3g} mm3 per m of stroke'
+
+
 @house_style()
-def write_oring_report(computed: Computed, out: Path, uncertainty: Uncertainty | None = None) -> tuple[Path, ...]:
-    """Write the report of a computed case, with the ``uncertainty`` of its force from samples; see `write_page`."""
-    case = computed.file.case
+def write_oring_report(
+    computed: Computed, out: Path, uncertainty: Uncertainty | None = None, meshes: str = ''
+) -> tuple[Path, ...]:
+    """Write the report of a computed case, see `write_page`.
+
+    With the ``uncertainty`` of its force from samples, and what other ``meshes`` give in a line of text.
+    """
+    case, readings = computed.file.case, len(computed.task.readings)
+    measured = f'computed, readings: {readings}' if readings else 'computed, no measured data'
     return write_page(
         out,
         'oring',
         oring_figures(computed),
         verdict=_verdict(computed),
-        head=head_of(f'oring {case.name}', 'computed, no measured data', case.name),
+        head=head_of(f'{"oring" if case.section is None else "section"} {case.name}', measured, case.name),
+        meshes=meshes,
         file=computed.file,
         case=case,
         summary=computed.summary,
@@ -89,6 +105,7 @@ def write_oring_report(computed: Computed, out: Path, uncertainty: Uncertainty |
         number_table=_number_table(computed),
         thesis_table=_thesis_table(computed),
         friction_table=_friction_table(computed),
+        film_table=_film_table(computed),
         **uncertainty_values(uncertainty, computed.file.unknown),
     )
 
@@ -107,6 +124,8 @@ def _verdict(computed: Computed) -> Verdict:
         return Verdict(level, text, 'compute with more lines (numerics.lines of the case) and compare.')
     if not summary.friction_N:
         return Verdict(level, text, 'add a coefficient of friction to the case for friction.')
+    if computed.task.readings:
+        return Verdict(level, text, 'compare a reading at another pressure.')
     return Verdict(level, text, 'measure a few readings and compare: the modulus decides.')
 
 
@@ -171,6 +190,19 @@ def _friction_table(computed: Computed) -> Table:
     columns = (measured.pressures, each.tolist(), (each * (1.0 + off / 100.0)).tolist(), off.tolist())
     rows = zip(*columns, strict=True)
     return Table(heads, [(number(p / BAR), number(m), number(own), number(o, 1, signed=True)) for p, m, own, o in rows])
+
+
+def _film_table(computed: Computed) -> Table:
+    """Film of each direction; no rows without a fluid."""
+    summary = computed.summary
+    films = zip(summary.pressure_Pa, summary.film_out_m, summary.film_back_m, summary.leakage_m3_per_m, strict=False)
+    columns: Columns = (
+        ('pressure [bar]', lambda row: number(row[0], unit=BAR)),
+        ('film out [um]', lambda row: number(row[1], 3, unit=UM)),
+        ('film back [um]', lambda row: number(row[2], 3, unit=UM)),
+        ('leakage [mm3 per m of stroke]', lambda row: number(row[3], 2, unit=MM**3)),
+    )
+    return table_of(list(films), columns)
 
 
 def geometry_friction(computed: Computed, pressures: FloatArray) -> FloatArray:

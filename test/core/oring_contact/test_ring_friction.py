@@ -55,6 +55,15 @@ def test_the_integral_over_an_elliptic_stress_has_its_closed_form():
     assert hertz(100.0, 1e-3, nodes=80).sheared_area(n) == pytest.approx(exact, rel=1e-4)
 
 
+def test_a_contact_that_shrinks_by_less_than_the_error_of_the_mesh_has_a_law_and_one_that_shrinks_more_is_refused():
+    geometry = parse_oring_case(read_yaml(config_path('oring', 'ms28775_114'))).case.geometry
+    law, first = ShearLaw(2.5e5, 1.0), hertz(100.0, 0.9e-3)
+    level = friction_law(law, geometry, PRESSURES, [first, hertz(98.0, 0.9e-3), hertz(230.0, 1.1e-3)])
+    assert level.coulomb_friction(2e6) == level.coulomb_friction(0.0) == pytest.approx(25.0)
+    with pytest.raises(ValueError, match='friction falls with pressure, at 2e\\+06 Pa by 4 %: the fluid passes a lip'):
+        friction_law(law, geometry, PRESSURES, [first, hertz(96.0, 0.9e-3), hertz(230.0, 1.1e-3)])
+
+
 def test_the_law_of_a_seal_file_is_the_friction_of_each_contact():
     geometry = parse_oring_case(read_yaml(config_path('oring', 'ms28775_114'))).case.geometry
     for law in (ShearLaw(2.5e5, 0.3), PowerLaw(2.0, 0.5)):

@@ -7,8 +7,10 @@ import pytest
 from harness.ring_transfer import (
     DELFT,
     LOGS,
+    computed_ring,
     delft_reading,
     fitted,
+    frictions_of_cycles,
     of_others,
     off,
     ring_of,
@@ -18,6 +20,8 @@ from harness.ring_transfer import (
 from paths import ROOT
 
 THESIS_LINES, DELFT_LINES = 25, 33
+
+needs_delft = pytest.mark.skipif(not DELFT.exists(), reason=f'{DELFT} is not there')
 
 
 @pytest.fixture(scope='module')
@@ -60,9 +64,8 @@ def test_one_reading_of_the_thesis_at_300_psi_or_more_predicts_the_others_within
         assert (others['shear law'] < others['constant']).all()
 
 
+@needs_delft
 def test_one_log_of_delft_predicts_the_others_within_12_percent_in_the_mean_and_25_at_worst(delft):
-    if not DELFT.exists():
-        pytest.skip(f'{DELFT} is not there')
     logs = delft._replace(readings=[delft_reading(DELFT / log) for log in LOGS])
     found = {model: of_others(values) for model, values in with_one_reading(logs).items()}
     assert found['shear law'].mean(axis=1).max() < 12.0
@@ -78,11 +81,67 @@ def test_the_shipped_seal_has_the_law_of_the_readings_of_the_thesis(thesis):
     assert found.exponent == pytest.approx(exponent, abs=0.02)
 
 
+# -- other sections of the Delft rig ----------------------------------------------------------------------------------
+
+IN_25_MM = {'rod_diameter': 17e-3, 'gland_diameter': 25e-3, 'sliding_wall': 'bore'}
+LIP_SEAL = {
+    'section': {'shape': 'u_cup'},
+    'geometry': {'section_diameter': 4.6e-3, 'ring_inner_diameter': 16.6e-3, **IN_25_MM},
+    'groove': {'width': 8e-3, 'diametral_clearance': 0.1e-3},
+    'rubber': {'hardness': 72.0},
+}
+ROUND_SEAL = {
+    'geometry': {'section_diameter': 3.53e-3, 'ring_inner_diameter': 17.9e-3, **IN_25_MM, 'rod_diameter': 18.646e-3},
+    'groove': {'width': 4.8e-3, 'diametral_clearance': 0.1e-3},
+    'rubber': {'hardness': 70.0},
+}
+
+
+def after_3_bar_of(log, bars, document):
+    """Deviation of the friction of a seal of the rig at its pressures after the reading at 3 bar [%]."""
+    readings = [delft_reading(DELFT / f'{log}_{bar}bar.csv', 0.025) for bar in bars]
+    measured = {'seals': 1, 'pressures': [1e5 * bar for bar in bars], 'frictions': [one.friction for one in readings]}
+    case = {'name': log, 'source': log, 'pressures': [0.0, *measured['pressures']], 'measured': measured}
+    return with_one_reading(computed_ring(case | document, DELFT_LINES))['shear law'][bars.index(3)]
+
+
 def test_one_reading_of_the_x_ring_predicts_1_to_5_bar_within_20_percent_and_misses_7_bar():
     ring = ring_of('delft_x_ring', DELFT_LINES)
     found = with_one_reading(ring)
     after_3_bar = found['shear law'][1]
     assert np.abs(after_3_bar[[0, 2]]).max() < 20.0
     assert np.abs(found['mu N'][:3, :3]).max() < 10.0  # each from each of the three
-    assert after_3_bar[3] < -35.0  # friction doubles from 5 to 7 bar, the contact does not
+    assert after_3_bar[3] < -35.0
     assert found['mu N'][1][3] < -30.0
+
+
+@needs_delft
+def test_friction_of_the_x_ring_at_7_bar_depends_on_cycle_and_place_which_no_contact_stress_does():
+    grown = {}
+    for bar in (1, 3, 5, 7):
+        cycles = frictions_of_cycles(DELFT / f'X-ring257_{bar}bar.csv', 2.0, 26.0)
+        assert len(cycles) == 10
+        grown[bar] = cycles[-1] / cycles[0] - 1.0
+    assert max(abs(grown[bar]) for bar in (1, 3, 5)) < 0.1
+    assert grown[7] > 0.25
+    middle, end = (frictions_of_cycles(DELFT / 'X-ring257_7bar.csv', *place) for place in ((2.0, 14.0), (33.0, 36.0)))
+    assert middle[-1] > 17.0
+    assert 9.0 < end.min() < end.max() < 12.0  # mu N after 3 bar: 10.0 N
+
+
+@needs_delft
+@pytest.mark.parametrize(
+    ('log', 'bars', 'document', 'within'),
+    [('NAPN', (1, 3, 5, 7), LIP_SEAL, (10.0,) * 4), ('Stadium_lc', (1, 2, 3, 4, 5), ROUND_SEAL, (20.0,) * 4 + (35.0,))],
+    ids=['lip seal', 'stadium'],
+)
+def test_one_reading_at_3_bar_predicts_other_pressures_of_another_seal(log, bars, document, within):
+    found = after_3_bar_of(log, bars, document)
+    assert (np.abs(found) < within).all(), found
+
+
+@needs_delft
+@pytest.mark.long
+def test_the_height_of_a_lip_decides_where_its_flank_touches_so_a_guess_of_it_is_not_a_drawing():
+    lower = {**LIP_SEAL, 'geometry': {**LIP_SEAL['geometry'], 'section_diameter': 4.4e-3}}
+    assert np.abs(after_3_bar_of('NAPN', (1, 3, 5, 7), lower)).max() > 70.0

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from harness.report_page import checked_page
 from paths import ROOT
 
 from seal_friction_ros.core.friction.seal_file import parse_seal
@@ -29,14 +30,42 @@ def test_a_drawing_becomes_a_seal_file_that_meets_its_reading(tmp_path: Path, ca
     drawing = write(tmp_path / 'ring.csv', placed(SHAPES['x_ring'](), 18.64, 3.53).outline)
     out = tmp_path / 'ring.yaml'
     command = ['section', str(drawing), *WALLS, '--pressure', '3bar', '6bar', '--reading', '3bar,10mm/s,6.5N']
-    assert main([*command, '--lines', '17', '--out', str(out), '--json']) == 0
+    page = tmp_path / 'ring.html'
+    files = ['--out', str(out), '--report', str(page)]
+    assert main([*command, '--lines', '29', '--film', '0.1,100mm/s', *files, '--json']) == 0
     numbers = json.loads(capsys.readouterr().out)
     seal = parse_seal(read_yaml(out))
     assert seal.coulomb_law.coulomb_friction(3e5) == pytest.approx(6.5, rel=1e-6)
     assert read_yaml(out)['geometry']['ring_inner_diameter'] == pytest.approx(18.64e-3)
-    assert numbers['mesh']['lines'] == [12, 17, 24]
+    assert numbers['mesh']['lines'] == [20, 29, 41]
     assert 0.0 < numbers['mesh']['error'] < 0.1  # a coarse mesh, for speed
     assert numbers['pressure_Pa'] == [0.0, 3e5, 6e5]
+    assert all(0.1e-6 < film < 2e-6 for film in numbers['film_out_m'] + numbers['film_back_m'])
+    differences = np.subtract(numbers['film_out_m'], numbers['film_back_m'])
+    assert numbers['leakage_m3_per_m'] == pytest.approx(0.5 * differences * np.pi * 25.7e-3, rel=1e-3)
+    assert 0.0 < numbers['mesh']['film_error'] < 0.2
+    shown = checked_page(page)
+    assert shown.texts['h1'] == ['Seal ring']
+    assert any('meshes of 20, 29, 41 lines' in text for text in shown.texts['p'])
+    rows = next(table for table in shown.tables if 'film out [um]' in table[0])[1:]
+    table = np.char.replace(rows, '\N{MINUS SIGN}', '-').astype(float)
+    in_page = np.array([numbers['film_out_m'], numbers['film_back_m'], numbers['leakage_m3_per_m']]) * [
+        [1e6],
+        [1e6],
+        [1e9],
+    ]
+    assert table[:, 1:] == pytest.approx(in_page.T, abs=6e-3)
+
+
+def test_a_seal_that_ends_at_a_corner_says_so_instead_of_a_film(capsys: pytest.CaptureFixture[str]):
+    walls = ['--height', '5.7mm', '--rod', '36mm', '--gland', '46mm', '--hardness', '93', '--lines', '13']
+    assert main(['section', 'u_cup', *walls, '--pressure', '50bar', '--film', '0.03,0.1']) == 0
+    assert 'film of a smooth seal: unknown, a lip ends at a corner' in capsys.readouterr().out
+
+
+def test_a_film_without_viscosity_is_refused(capsys: pytest.CaptureFixture[str]):
+    assert main(['section', 'x_ring', '--height', '3.53mm', *WALLS, '--pressure', '3bar', '--film', '0,0.1']) == 2
+    assert 'a film needs a viscosity and a speed above 0' in capsys.readouterr().err
 
 
 def test_a_shape_lies_in_the_middle_of_the_gap_and_a_drawing_where_it_is_drawn(tmp_path: Path):
