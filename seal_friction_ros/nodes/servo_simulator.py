@@ -84,7 +84,6 @@ class ServoSimulator(ManagedNode):
             self._subscribe('servo_reference', message_class(REFERENCE_TYPE), self._on_reference)
 
     def _outputs_by_topic(self) -> dict[str, Any]:
-        """Type of the message on each topic."""
         if self._settings.messages == 'standard':
             return standard_messages.outputs(self.settings(StandardMessages))
         own = {topic: message_class(INPUTS[topic]) for topic in _OUTPUTS}

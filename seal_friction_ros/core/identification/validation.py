@@ -67,7 +67,6 @@ def cross_validate(
 
 
 def _left_out_of_model(law: CandidateLaw, readings: FrictionReadings) -> CrossValidation:
-    """As `cross_validate`, for a law of all terms."""
     model = cast(ModelFit, fit(law, readings).model)  # a law with a prior has one
     predicted, deviation, vectors = friction_model.left_out(model, readings)
     seals = readings.at.pressure.shape[1]

@@ -206,7 +206,6 @@ class Recorder:
         return None
 
     def _begin(self, following: _NextBag) -> bool:
-        """Make the next bag; whether it could be made."""
         self._present += 1
         try:
             self._writer = self._make(following.path)

@@ -24,7 +24,7 @@ from seal_friction_ros.core.friction.seal_file import parse_part, parse_seal
 from seal_friction_ros.core.identification import diagnostics, fitting, run_in, runs, seal_kinds, validation
 from seal_friction_ros.core.identification.breakaway import BreakawayFit, fit_breakaway
 from seal_friction_ros.core.identification.calibration import calibration
-from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, SealKind, candidate_laws, normal_forces
+from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, SealKind, candidate_laws
 from seal_friction_ros.core.identification.force_correction import ForceCorrection, force_correction
 from seal_friction_ros.core.identification.friction_model import Told
 from seal_friction_ros.core.identification.prepare_readings import with_predictable_groups
@@ -142,7 +142,7 @@ def gather(paths: Sequence[Place], options: IdentifyOptions, workers: Workers = 
     ring = _ring(sources, options)
     prepared = _prepared(sources, kinds)
     _check_one_seal(diagnostics.shared_levels(prepared.readings), options.refuse_changed)
-    correction = _correction(prepared, sources.has_fitted_load)
+    correction = _correction(prepared.readings, sources.has_fitted_load)
     if correction is not None and correction.is_significant:
         sources = sources.corrected(correction)
         prepared = _prepared(sources, kinds)
@@ -153,13 +153,12 @@ def gather(paths: Sequence[Place], options: IdentifyOptions, workers: Workers = 
             readings=at_reference(prepared.readings, warmth),
             breakaway=None if breakaway is None else at_reference(breakaway, warmth),
         )
-    readings = _with_normal_force(prepared.readings, ring)
-    outlier = None
+    readings, outlier = prepared.readings, None
     if not readings.are_samples and not kinds:
         laws = [law for law in _candidates(readings) if law.law_type is PressurePowerLaw and law.fixed]
         outlier = diagnostics.outlying_level(laws, readings)
     used = readings if outlier is None else readings.without(readings.level == outlier.level)
-    return IdentificationData(sources, prepared._replace(readings=readings), used, ring, outlier, correction, warmth)
+    return IdentificationData(sources, prepared, used, ring, outlier, correction, warmth)
 
 
 def _prepared(sources: Sources, kinds: tuple[SealKind, ...]) -> PreparedReadings:
@@ -178,17 +177,17 @@ def _prepared(sources: Sources, kinds: tuple[SealKind, ...]) -> PreparedReadings
             f'{where}: nothing but friction loads the rod, so the pressures are the effect of the friction and '
             'tell no kinds apart: load the rod and record the load, or drive with several supply or return pressures'
         )
-    readings = seal_kinds.kinds_readings(prepared.readings, prepared.chamber_pressures, kinds)
+    readings = seal_kinds.kinds_readings(prepared.readings, kinds)
     seal_kinds.check_kinds(readings)
     return prepared._replace(readings=readings)
 
 
-def _correction(prepared: PreparedReadings, has_fitted_load: bool) -> ForceCorrection | None:
-    if not prepared.readings.kinds:
-        return force_correction(prepared)
-    variation = variation_of(prepared.readings)
+def _correction(readings: FrictionReadings, has_fitted_load: bool) -> ForceCorrection | None:
+    if not readings.kinds:
+        return force_correction(readings)
+    variation = variation_of(readings)
     speeds, asymmetry = variation.speeds, variation.asymmetry and not has_fitted_load
-    return seal_kinds.area_errors(prepared.readings, Told(speeds, speeds, asymmetry, areas=True))
+    return seal_kinds.area_errors(readings, Told(speeds, speeds, asymmetry, areas=True))
 
 
 def _told_apart(data: IdentificationData, selection: LawSelection, largest_error: float) -> seal_kinds.ToldApart | None:
@@ -217,13 +216,6 @@ def _ring(sources: Sources, options: IdentifyOptions) -> Ring | None:
         force = rounded_numbers(squeeze_force(geometry))
         normal_force = {'law': 'area_deformation_gain', 'area_deformation_gain': gain, 'radial_force': force}
     return Ring(geometry, parse_part(NormalForceLaw, {'normal_force': normal_force}, 'seal'))
-
-
-def _with_normal_force(readings: FrictionReadings, ring: Ring | None) -> FrictionReadings:
-    if ring is None:
-        return readings
-    forces = normal_forces(readings.at.pressure, *ring)
-    return replace(readings, at=readings.at._replace(normal_force=forces))
 
 
 def _check_one_seal(changes: Sequence[diagnostics.RunChange], refuse_changed: bool) -> None:
@@ -326,7 +318,6 @@ def _recommended(readings: FrictionReadings, ring: Ring | None, has_fitted_load:
 def _scored(
     readings: FrictionReadings, ring: Ring | None, has_fitted_load: bool, tick: validation.Ticks = lambda _: None
 ) -> tuple[LawScore | NotScored, ...]:
-    """Scores of the ladder on some of the readings."""
     variation = variation_of(readings)
     if has_fitted_load:  # asymmetry is not identifiable: the fitted load holds it
         variation = variation._replace(asymmetry=False)
@@ -375,12 +366,10 @@ def assess(
 
 
 def _breakaway(data: IdentificationData, found: fitting.LawFit) -> BreakawayFit | None:
-    if data.prepared.breakaway is None:
-        return None
-    readings = _with_normal_force(data.prepared.breakaway, data.ring)
-    if data.outlier is not None:
+    readings = data.prepared.breakaway
+    if readings is not None and data.outlier is not None:
         readings = readings.taken(readings.level != data.outlier.level)
-    if len(readings.groups) < 2:
+    if readings is None or len(readings.groups) < 2:
         return None
     return fit_breakaway(readings, found.law.coulomb_friction(readings.at, found.values), found.offsets)
 
@@ -390,7 +379,7 @@ def _levels(
 ) -> tuple[PressureLevel, ...]:
     """Measured and fitted friction at each pressure level, by the ``mounted`` seals."""
     readings = data.prepared.readings
-    fitted, std = fitted_readings(mounted, data.prepared.chamber_pressures, readings.at.velocity)
+    fitted, std = fitted_readings(mounted, readings.chamber_pressures, readings.at.velocity)
     measured = readings.magnitudes(fitting.offsets_of(readings, fitted))
     is_mean = readings.are_samples or bool(readings.kinds)  # a condition of several kinds holds several speeds
     unseen = np.full((data.used.count, 2), np.nan)

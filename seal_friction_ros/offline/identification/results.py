@@ -353,7 +353,6 @@ def kinds_numbers(found: Identification) -> dict[str, Any]:
 
 
 def _kind_numbers(found: Identification, fit: fitting.LawFit, told: ToldApart, number: int) -> dict[str, Any]:
-    """Numbers of the kind of index ``number``."""
     readings, total = found.data.used, float(told.friction.sum())
     kind = readings.kinds[number]
     of_one = fit.law.of_one_seal(fit.values)[number]
@@ -436,7 +435,6 @@ def _correction_numbers(correction: ForceCorrection | None) -> dict[str, Any]:
 
 
 def _run_in_numbers(data: IdentificationData, drifts: Sequence[Drift]) -> list[dict[str, Any]]:
-    """Drift of the friction over each run."""
     return [
         {
             'source': data.sources.files[drift.source].name,

@@ -32,8 +32,6 @@ _Decoded = tuple[bytes, dict[str, Any]]  # bytes and fields of a message
 
 
 class _Topic(NamedTuple):
-    """A topic of a bag."""
-
     bag: Path
     name: str
     read: Callable[[], Iterator[BagMessage]]

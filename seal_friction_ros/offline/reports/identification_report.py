@@ -203,7 +203,7 @@ class _FittedReadings:
         self.pressure = self.readings.seal_pressure / BAR
         self.mounted = mounted_seals(found.as_measured)
         self.seal = self.mounted[0].seal
-        self.fitted, _ = fitted_readings(self.mounted, found.data.prepared.chamber_pressures, self.readings.at.velocity)
+        self.fitted, _ = fitted_readings(self.mounted, self.readings.chamber_pressures, self.readings.at.velocity)
         self.measured = self.readings.magnitudes(offsets_of(self.readings, self.fitted))
         self.unit, self.size = force_unit(float(self.measured.max()))
         self.is_used = self.readings.level != (-1 if found.data.outlier is None else found.data.outlier.level)

@@ -45,7 +45,7 @@ def readings(bars, speeds=(0.02,), force=None, sources=1, samples=False, count=1
     ]
     source, level, velocity = np.array(rows).T
     source, level, direction = source.astype(int), level.astype(int), np.sign(velocity)
-    at = OperatingConditions(np.asarray(bars, float)[level][:, np.newaxis] * BAR, None, velocity, direction)
+    at = OperatingConditions(np.asarray(bars, float)[level][:, np.newaxis] * BAR, velocity, direction)
     magnitude = np.full(len(rows), 10.0) if force is None else np.asarray(force, float)
     names = tuple(map(str, range(sources)))
     return FrictionReadings(at, direction * magnitude, source, level, level, names, 'pressure', samples)

@@ -29,7 +29,7 @@ def runs(frictions, offsets):
     """Four readings of two seals in each run, with the friction [N] and the offset [N] of the run."""
     n = len(frictions)
     source, direction = np.repeat(np.arange(n), 4), np.tile([1.0, -1.0], 2 * n)
-    at = OperatingConditions(np.full((4 * n, 2), 1e6), None, 0.02 * direction, direction)
+    at = OperatingConditions(np.full((4 * n, 2), 1e6), 0.02 * direction, direction)
     force = direction * np.repeat(frictions, 4) + np.repeat(offsets, 4)
     names = tuple(map(str, range(n)))
     return FrictionReadings(at, force, source, source, np.zeros(4 * n, int), names, 'file', are_samples=False)
@@ -121,7 +121,7 @@ def test_the_offset_of_a_run_is_told_whatever_pressures_its_directions_have():
     direction = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, *[1.0] * 3, *[-1.0] * 3])
     source = np.repeat([0, 1], 6)
     scatter = np.array([0.0] * 6 + [0.0, 0.0, 3.0, 0.0, 0.0, -6.0])
-    at = OperatingConditions(1e5 * bars[:, np.newaxis], None, 0.02 * direction, direction)
+    at = OperatingConditions(1e5 * bars[:, np.newaxis], 0.02 * direction, direction)
     force = direction * line.friction(at, values) + 4.0 * source + scatter
     level = np.searchsorted([10.0, 20.0, 30.0], bars)
     readings = FrictionReadings(at, force, source, source, level, ('a', 'b'), 'file', are_samples=False)

@@ -173,7 +173,7 @@ def test_delft_two_runs_of_one_ring_are_fitted_together_and_the_band_holds_the_o
         assert half_width.max() <= 0.45
         log = read_sources([Path(path) for path in other], SourceOptions(rig='delft')).prepare()
         mounted = (MountedSeal(parse_seal(alone.document), 'a'),)
-        fitted, std = fitted_readings(mounted, log.chamber_pressures, log.readings.at.velocity)
+        fitted, std = fitted_readings(mounted, log.readings.chamber_pressures, log.readings.at.velocity)
         strokes = log.readings.magnitudes(offsets_of(log.readings, fitted))
         assert np.mean(np.abs(strokes - fitted) <= BAND_95 * std) >= 0.9
 
@@ -359,7 +359,7 @@ def test_mbari_the_law_of_one_log_is_sound_and_its_band_holds_the_other(friction
     log = read_sources([data(f'mbari/{OTHER}')], SourceOptions(rig='mbari')).prepare()
     chosen = np.arange(0, log.readings.count, 7)
     mounted = tuple(MountedSeal(parse_seal(friction_id.document), chamber) for chamber in chambers)
-    fitted, std = fitted_readings(mounted, log.chamber_pressures[chosen], log.readings.at.velocity[chosen])
+    fitted, std = fitted_readings(mounted, log.readings.chamber_pressures[chosen], log.readings.at.velocity[chosen])
     signed = log.readings.force[chosen] - log.readings.at.direction[chosen] * fitted
     deviation = signed - signed.mean()
     assert np.sqrt(np.mean(deviation**2)) < 460.0  # [N] the laws with a constant or a free exponent leave 418 to 560 N
