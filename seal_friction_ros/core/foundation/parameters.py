@@ -29,10 +29,6 @@ class Meaning:
     start: Callable[[Any], float] | None = None  # first guess of a fit, from a `TypicalReading`; None: never fitted
     fit_bounds: tuple[float, float] | None = None  # bounds of a fit, where they are narrower
 
-    def bounds_text(self) -> str:
-        """Bounds as text, for example ``0.0 to 1.0``; empty without bounds."""
-        return '' if self.lower is None and self.upper is None else f'{self.lower} to {self.upper}'
-
 
 def parameter(default: Any = dataclasses.MISSING, **meaning: Any) -> Any:
     """Dataclass field with its `Meaning`, whose fields are the keyword arguments; both bounds are included."""
