@@ -84,14 +84,7 @@ class EstimatorNode(ManagedNode):
     """Lifecycle node around `core.machine.machine`.
 
     With a parameter ``machine`` it has the actuators of that mapping file; without, one with the built-in mapping.
-
-    Args:
-        name: Default name of the node.
-        groups: Its parameters, besides those of the actuators of a mapping file.
-        kwargs: Arguments of `rclpy.lifecycle.LifecycleNode`.
-
-    Raises:
-        ValueError: A parameter has the wrong type or is out of bounds, or the mapping file is not valid.
+    ValueError: A parameter has the wrong type or is out of bounds, or the mapping file is not valid.
     """
 
     _watch: GraphWatch

@@ -46,8 +46,7 @@ _NORMAL_LIMITS = ('limited FORCE', 'limited SPOOL')  # a servo at full force or 
 class ServoSimulator(ManagedNode):
     """Lifecycle node around `core.servo.position_servo` and `core.servo.pull_rig`.
 
-    Raises:
-        ValueError: A parameter has the wrong type or is out of bounds.
+    ValueError: A parameter has the wrong type or is out of bounds.
     """
 
     def __init__(self, **kwargs: Any) -> None:

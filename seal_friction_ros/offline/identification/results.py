@@ -18,6 +18,7 @@ from seal_friction_ros.core.identification.calibration import Calibration
 from seal_friction_ros.core.identification.candidate_laws import DIVIDED, CandidateLaw, SealKind, columns_of
 from seal_friction_ros.core.identification.diagnostics import Outlier, RunChange
 from seal_friction_ros.core.identification.force_correction import NOTICED, ForceCorrection
+from seal_friction_ros.core.identification.load_over_position import LoadOverPosition, load_at
 from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
 from seal_friction_ros.core.identification.run_in import Drift, SettledLaw
 from seal_friction_ros.core.identification.runs import BetweenRuns
@@ -31,7 +32,6 @@ from seal_friction_ros.core.identification.validation import (
     jackknife_covariance,
     table_of,
 )
-from seal_friction_ros.offline.identification.load_numbers import load_numbers
 from seal_friction_ros.offline.identification.presliding import (
     IdentifiedPresliding,
     presliding_numbers,
@@ -39,6 +39,8 @@ from seal_friction_ros.offline.identification.presliding import (
 )
 from seal_friction_ros.offline.identification.sources import Sources
 from seal_friction_ros.offline.work.seal_writer import rounded_numbers
+
+LOAD_POINTS = 21  # equally spaced positions at which the load is given (our choice)
 
 
 class Ring(NamedTuple):
@@ -309,9 +311,33 @@ def identification_section(
             'warnings': warnings,
         }
     )
-    load = load_numbers([(source.file.name, source.load) for source in data.sources.each])
-    section |= {} if load is None else {'load': load}
+    loads = [_load_numbers(source.file.name, source.load) for source in data.sources.each if source.load is not None]
+    section |= {'load': loads[0] | ({'others': loads[1:]} if loads[1:] else {})} if loads else {}
     return section if presliding is None else section | {'presliding': _without_nan(presliding_numbers(presliding))}
+
+
+def _load_numbers(name: str, load: LoadOverPosition) -> dict[str, Any]:
+    position = np.linspace(load.knots[0], load.knots[-1], LOAD_POINTS)
+    position[-1] = load.knots[-1]
+    numbers: dict[str, Any] = rounded_numbers(
+        {
+            'source': name,
+            'position_m': position,
+            'force_N': load_at(load, position),
+            'std_N': np.interp(position, load.knots, load.std),
+            'mass_kg': load.mass,
+            'mass_std_kg': load.mass_std,
+            'mass_change_kg_per_m': load.mass_change,
+            'noise_N': load.noise,
+            'strokes': load.strokes,
+            'condition_number': load.condition_number,
+            'friction_N': load.friction.mean,
+            'friction_standard_error_N': load.friction.standard_error,
+            'friction_terms': dict(zip(load.friction.names, load.friction.values.tolist(), strict=True)),
+            'warnings': load.warnings,
+        }
+    )
+    return numbers
 
 
 def kind_section(data: IdentificationData, quality: LawQuality, number: int) -> dict[str, Any]:

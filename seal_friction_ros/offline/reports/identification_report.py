@@ -83,9 +83,11 @@ def _verdict(found: Identification, files: Sequence[str]) -> Verdict:
         shares = [(kind.name, friction / total, std / total) for kind, friction, std in parts]
         return _verdict_on_kinds(selection.validation.error, shares, files)
     remarks = {
-        'outlier': found.data.outlier is not None,
-        'changed': any(change.is_changed for change in quality.changes),
-        'drifted': any(level.is_used and abs(level.drift) > diagnostics.SETTLED for level in found.levels),
+        'one pressure is an outlier and was left out': found.data.outlier is not None,
+        'friction differs between the runs': any(change.is_changed for change in quality.changes),
+        'friction drifted during the runs': any(
+            level.is_used and abs(level.drift) > diagnostics.SETTLED for level in found.levels
+        ),
     }
     numbers = selection.validation.error, worst_left_out(found.levels), quality.coverage, selection.fit.why_unsound
     return verdicts.of_identification(selection.law.name, *numbers, *filter(remarks.get, remarks))
