@@ -241,7 +241,7 @@ def _read_log(path: Path, options: SourceOptions) -> Source:
             check_clipping(path.name, where, column[moving] * UNITS[term.unit], is_pressure=is_pressure)
     seconds = (samples.stamp - samples.stamp[0]) * 1e-9
     signals = Signals(seconds, samples.velocity, samples.chamber_a, samples.chamber_b, samples.force_sum)
-    recorded = RecordedLog(path.name, signals, sliding, log.temperature, log.position, dict(log.dropped))
+    recorded = RecordedLog(path.name, signals, sliding, log.track.temperature, log.position, dict(log.dropped))
     recorded, texts = _admitted(recorded)
     remarks = (*remarks, *texts, *(f'{path.name}: {text}' for text in log.remarks))
     source = Source(_data_file(path), None, recorded, pressure_area=_pressure_area(rig), remarks=remarks)
