@@ -53,8 +53,7 @@ class _UniqueKeyLoader(yaml.CSafeLoader):
 def _check_cost(text: str) -> None:
     """Check that the memory and the time to load a text are proportional to its length.
 
-    Raises:
-        yaml.YAMLError: The text has aliases (a few lines can expand to gigabytes), too many levels, or a long scalar.
+    yaml.YAMLError: The text has aliases (a few lines can expand to gigabytes), too many levels, or a long scalar.
     """
     depth = 0
     for event in yaml.parse(text, Loader=yaml.CSafeLoader):
@@ -70,12 +69,7 @@ def _check_cost(text: str) -> None:
 def read_yaml(path: Path, largest: int = _LARGEST_YAML) -> Any:
     """Document of a YAML file, plain data only.
 
-    Args:
-        path: The file.
-        largest: Largest size accepted [bytes].
-
-    Raises:
-        ValueError: The file is missing, not readable, too large or not plain YAML; one line that names the file.
+    ValueError: The file is missing, not readable, above ``largest`` [bytes] or not plain YAML; one line that names it.
     """
     with named_errors(path, OSError):
         if path.exists() and not (path.is_file() or path.is_dir()):  # reading a pipe or a device may never end
@@ -88,8 +82,7 @@ def read_yaml(path: Path, largest: int = _LARGEST_YAML) -> Any:
 def parse_yaml(data: bytes, where: str, largest: int = _LARGEST_YAML) -> Any:
     """Document in YAML, plain data only; ``where`` names its source in the error message.
 
-    Raises:
-        ValueError: The document is larger than ``largest`` bytes, or not plain YAML.
+    ValueError: The document is larger than ``largest`` bytes, or not plain YAML.
     """
     if len(data) > largest:
         raise ValueError(f'{where}: larger than {largest} bytes, not a file of this kind')
@@ -104,10 +97,7 @@ def parse_yaml(data: bytes, where: str, largest: int = _LARGEST_YAML) -> Any:
 def share_directory(package: str, module_file: str) -> Path:
     """Share folder of a package: ``share/<package>`` of an install prefix, or the source tree itself.
 
-    The search goes upward from the folder of ``module_file``.
-
-    Raises:
-        FileNotFoundError: The search finds no share folder.
+    The search goes upward from the folder of ``module_file``. FileNotFoundError: The search finds no share folder.
     """
     paths = (Path(module_file), Path(module_file).resolve())  # colcon --symlink-install links into the source tree
     for parent in (parent for path in paths for parent in path.parents):
@@ -127,8 +117,7 @@ def package_version() -> str:
 def config_path(kind: str, name: str) -> Path:
     """Path of a configuration file: ``name`` itself if it is a path, else ``config/<kind>/<name>.yaml``.
 
-    Raises:
-        ValueError: The path starts with an unknown user (``~user``), or there is no file of this name.
+    ValueError: The path starts with an unknown user (``~user``), or there is no file of this name.
     """
     if '/' in name or name.endswith('.yaml'):
         with named_errors(name, RuntimeError):
@@ -154,8 +143,7 @@ def load_configuration(
 ) -> Configuration:
     """Configuration with the seal files that ``selection`` names.
 
-    Raises:
-        ValueError: A seal file cannot be read or is invalid; one line that names file, field, value and bound.
+    ValueError: A seal file cannot be read or is invalid; one line that names file, field, value and bound.
     """
     twice = [name for name in selection.seals if names_chamber(name)]  # without seal_chambers they have been split
     if twice:
@@ -171,8 +159,7 @@ def load_configuration(
 def with_seal(selection: SealSelection, seal: str) -> SealSelection:
     """Selection with a seal file for every seal; its mounting says how many they are, unless chambers are given.
 
-    Raises:
-        ValueError: The seal file cannot be read, or its mounting is not valid.
+    ValueError: The seal file cannot be read, or its mounting is not valid.
     """
     by_file = selection.seal_chambers == MOUNTING and mounting_of(read_yaml(config_path('seals', seal)))
     return replace(selection, seals=(seal,) * (1 if by_file else len(selection.seals)))
@@ -181,8 +168,7 @@ def with_seal(selection: SealSelection, seal: str) -> SealSelection:
 def load_seals(selection: SealSelection) -> tuple[MountedSeal, ...]:
     """The seals that ``selection`` names.
 
-    Raises:
-        ValueError: As `load_configuration`.
+    ValueError: As `load_configuration`.
     """
     return load_configuration(selection, EstimatorSettings()).parameters().estimator.seals
 
@@ -195,8 +181,7 @@ def default_configuration() -> Configuration:
 def load_parameter_file(path: Path) -> tuple[SealSelection, EstimatorSettings, FeedForwardSettings, AdaptationSettings]:
     """Seals, estimator, feed-forward and adaptation from a ROS parameter file of ``friction_estimator``.
 
-    Raises:
-        ValueError: As of `read_parameters`.
+    ValueError: As of `read_parameters`.
     """
     made = read_parameters(path, 'friction_estimator', FRICTION_ESTIMATOR_PARAMETERS)
     return made[SealSelection], made[EstimatorSettings], made[FeedForwardSettings], made[AdaptationSettings]
@@ -206,15 +191,8 @@ def read_parameters(path: Path, node: str, groups: Iterable[ParameterGroup]) -> 
     """A record for each group of parameters of a node, by its type, from a ROS parameter file.
 
     The sections of the node, ``*`` and ``**`` of any namespace count, and the only section of a file whatever its name.
-    Later sections override earlier ones. All parameters of the node are checked.
-
-    Args:
-        path: The file.
-        node: ``friction_estimator`` or ``servo_simulator``.
-        groups: All parameters of the node.
-
-    Raises:
-        ValueError: The file is not a parameter file, the node has no such parameter, or a value is invalid.
+    Later sections override earlier ones. All parameters of the node are checked. ValueError: The file is not a
+    parameter file, the node has no such parameter, or a value is invalid.
     """
     document = read_yaml(path)
     values: dict[str, Any] = {}
@@ -239,8 +217,7 @@ def read_parameters(path: Path, node: str, groups: Iterable[ParameterGroup]) -> 
 def read_machine(name: str) -> MachineFile:
     """Mapping file of a machine: a path, or the name of one in ``config/machines``; its seal files are relative to it.
 
-    Raises:
-        ValueError: It cannot be read or is invalid; one line that names file, actuator and key.
+    ValueError: It cannot be read or is invalid; one line that names file, actuator and key.
     """
     path = config_path('machines', name)
     file = parse_machine(read_yaml(path), str(path))
@@ -261,8 +238,7 @@ def _with_paths(actuator: Actuator, folder: Path) -> Actuator:
 def machine_configurations(file: MachineFile, where: str) -> dict[str, Configuration]:
     """Configuration of each actuator of a machine, with its seal files; ``where`` names the mapping file.
 
-    Raises:
-        ValueError: A seal file cannot be read or is invalid; one line that names the actuator.
+    ValueError: A seal file cannot be read or is invalid; one line that names the actuator.
     """
     configurations = {}
     for actuator in file.actuators:
@@ -276,10 +252,7 @@ def machine_configurations(file: MachineFile, where: str) -> dict[str, Configura
 def unknown_parameters(node: str, names: Iterable[str], declared: Collection[str] = ()) -> str:
     """One line that says which parameters a node lacks, with the node that has them or the most similar name.
 
-    Args:
-        node: ``friction_estimator`` or ``servo_simulator``.
-        names: Parameters that the node does not have.
-        declared: Those that it has, if they depend on others.
+    ``declared`` are those that it has, if they depend on others.
     """
     from seal_friction_ros.core.servo.simulator_options import (  # noqa: PLC0415  loads scipy, which the node does not
         SERVO_SIMULATOR_PARAMETERS,

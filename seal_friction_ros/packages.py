@@ -35,8 +35,7 @@ class MissingPackageError(ValueError):
 def needed(module: str) -> Any:
     """Import a module of an optional package.
 
-    Raises:
-        MissingPackageError: It is not installed.
+    MissingPackageError: It is not installed.
     """
     try:
         return import_module(module)

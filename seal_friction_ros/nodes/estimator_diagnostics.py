@@ -125,12 +125,9 @@ class EstimatorDiagnostics:
         self._clock_moved = False
 
     def on_input(self, name: str, stamp: int | None, lateness: int = 0) -> None:
-        """Count one message of an input.
+        """Count one message of an input, ``lateness`` [ns] after its sending; negative if the clocks differ.
 
-        Args:
-            name: Input.
-            stamp: Its stamp [ns]; None: the stamps do not tell what is missing, or there are none.
-            lateness: How long after its sending it came [ns]; negative if the clocks differ.
+        A ``stamp`` [ns] of None: the stamps do not tell what is missing, or there are none.
         """
         self._received[name] += 1
         if stamp is not None:
@@ -207,14 +204,9 @@ class EstimatorDiagnostics:
         parameters: EstimatorParameters | None = None,
         known: EstimatorState | None = None,
     ) -> DiagnosticStatus:
-        """Status of the estimate in this interval.
+        """Status of the estimate in this interval; ``refused``: the node rejects its inputs.
 
-        Args:
-            parameters: Of the estimator, if it adapts.
-            active: Whether the node estimates.
-            refused: Whether the node rejects its inputs because of duplicate publishers.
-            graph: State of the graph.
-            known: State of the estimator; None: it does not estimate.
+        ``parameters`` are those of the estimator, if it adapts; ``known`` is its state, None: it does not estimate.
         """
         swing = NO_SWING if known is None else known.swing
         seconds = max(time.monotonic() - self._started, 1e-3)

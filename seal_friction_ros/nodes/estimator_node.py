@@ -84,14 +84,7 @@ class EstimatorNode(ManagedNode):
     """Lifecycle node around `core.machine.machine`.
 
     With a parameter ``machine`` it has the actuators of that mapping file; without, one with the built-in mapping.
-
-    Args:
-        name: Default name of the node.
-        groups: Its parameters, besides those of the actuators of a mapping file.
-        kwargs: Arguments of `rclpy.lifecycle.LifecycleNode`.
-
-    Raises:
-        ValueError: A parameter has the wrong type or is out of bounds, or the mapping file is not valid.
+    ValueError: A parameter has the wrong type or is out of bounds, or the mapping file is not valid.
     """
 
     _watch: GraphWatch
@@ -165,7 +158,6 @@ class EstimatorNode(ManagedNode):
         self._create_timers()
 
     def _create_outputs(self) -> None:
-        """Publishers of answers, commands and configuration."""
         answers = {('', MACHINE_TYPE): '~/friction'}
         if not self._file.together:
             answers = {
@@ -186,7 +178,6 @@ class EstimatorNode(ManagedNode):
         self._topics = {key: publisher.topic_name for key, publisher in self._outputs.items()}
 
     def _made(self) -> Machine:
-        """Machine with the present parameters."""
         configurations = {actuator.name: self._configuration(actuator) for actuator in self._file.actuators}
         kinds = self._file.topics.values() if self._mapping else ()
         return make_machine(self._file, configurations, installed_definitions(kinds))
@@ -208,11 +199,9 @@ class EstimatorNode(ManagedNode):
         return replace(actuator, configuration=configuration, pipeline=pipeline)
 
     def _settings(self, actuator: Actuator) -> list[Any]:
-        """Present settings of estimator, feed-forward and adaptation of an actuator."""
         return [self.settings(group.record_type, group.prefix) for group in _groups(actuator)]
 
     def _new_statistics(self) -> None:
-        """Count anew."""
         self._statistics = {
             actuator.name: EstimatorDiagnostics([t for t in self._types if number in dict(self._plans[t].taken)])
             for number, actuator in enumerate(self._file.actuators)
@@ -250,7 +239,6 @@ class EstimatorNode(ManagedNode):
             made.clear()
 
     def _create_timers(self) -> None:
-        """Timers of the graph, the watchdog and the health, and the publisher of the health."""
         self._outputs[_HEALTH] = self.create_publisher(DiagnosticArray, '~/health', 10)
         kind = message_class(layouts.NEWEST_TYPE)
         self._outputs[_MONITOR] = self.create_publisher(kind, '~/monitor', qos.best_effort(qos.STREAM))
@@ -310,7 +298,6 @@ class EstimatorNode(ManagedNode):
         self._look_after_timers(done)
 
     def _on_malformed(self, name: str, error: ValueError) -> None:
-        """Count a message that cannot be read, and say why."""
         for listener in self._listeners[name]:
             listener.on_malformed(name)
         self.get_logger().error(f'{self._topics[name]}: {error}', throttle_duration_sec=1.0)
@@ -524,7 +511,6 @@ class EstimatorNode(ManagedNode):
         return self._state.actuators[0].pipeline.clock_offset
 
     def _apply_change(self) -> None:
-        """Apply the present parameters."""
         self._refuse_inputs(self._watch.duplicate_publishers())
         changed = tuple(map(self._changed, self._machine.actuators))
         if all(new is old for new, old in zip(changed, self._machine.actuators, strict=True)):
@@ -534,13 +520,11 @@ class EstimatorNode(ManagedNode):
             self.publish_configuration()
 
     def _set(self, **values: Any) -> None:
-        """Set fields of the state of every actuator."""
         for known in self._state.actuators:
             for name, value in values.items():
                 setattr(known.pipeline, name, value)
 
     def _snapshot(self) -> str:
-        """All that the next answer depends on, as text."""
         return machine_text(snapshot_of(self._machine, self._state))
 
     def on_change(self, changed: Collection[Parameter]) -> None:
@@ -646,7 +630,6 @@ class EstimatorNode(ManagedNode):
         return bool(outcome) and not self.recording.failure, outcome or 'not recording'
 
     def _reset_adaptation(self) -> tuple[bool, str]:
-        """Forget what the adaptation of every actuator has learnt."""
         for known in self._state.actuators:
             known.pipeline.estimator.adaptation = NOT_ADAPTED
         for statistics in self._statistics.values():

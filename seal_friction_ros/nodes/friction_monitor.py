@@ -186,7 +186,6 @@ class FrictionMonitor(Node):
         return True
 
     def _clients_of(self, node: str) -> tuple[Any, Any]:
-        """Clients of a node that set and read parameters."""
         if node not in self._clients_by_node:
             setter = self.create_client(SetParametersAtomically, f'{node}/set_parameters_atomically')
             self._clients_by_node[node] = setter, self.create_client(GetParameters, f'{node}/get_parameters')

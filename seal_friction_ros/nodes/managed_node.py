@@ -78,15 +78,7 @@ class ManagedNode(LifecycleNode):
     """Lifecycle node that configures and activates automatically (``autostart``) and rejects invalid parameters.
 
     A subclass overrides `make`, `release`, `start`, `finish`, `diagnostics` and optionally `check_change`, `on_change`
-    and `end_interval`.
-
-    Args:
-        name: Default name of the node, also its name in `unknown_parameters`.
-        groups: Parameters of the node, `StartOptions` among them.
-        kwargs: Arguments of `rclpy.lifecycle.LifecycleNode`.
-
-    Raises:
-        ValueError: A parameter has the wrong type or is out of bounds.
+    and `end_interval`. ValueError: A parameter has the wrong type or is out of bounds.
     """
 
     def __init__(self, name: str, groups: tuple[ParameterGroup, ...], **kwargs: Any) -> None:

@@ -46,8 +46,7 @@ _NORMAL_LIMITS = ('limited FORCE', 'limited SPOOL')  # a servo at full force or 
 class ServoSimulator(ManagedNode):
     """Lifecycle node around `core.servo.position_servo` and `core.servo.pull_rig`.
 
-    Raises:
-        ValueError: A parameter has the wrong type or is out of bounds.
+    ValueError: A parameter has the wrong type or is out of bounds.
     """
 
     def __init__(self, **kwargs: Any) -> None:
@@ -84,7 +83,6 @@ class ServoSimulator(ManagedNode):
             self._subscribe('servo_reference', message_class(REFERENCE_TYPE), self._on_reference)
 
     def _outputs_by_topic(self) -> dict[str, Any]:
-        """Type of the message on each topic."""
         if self._settings.messages == 'standard':
             return standard_messages.outputs(self.settings(StandardMessages))
         own = {topic: message_class(INPUTS[topic]) for topic in _OUTPUTS}

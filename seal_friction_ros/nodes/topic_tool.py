@@ -283,7 +283,6 @@ def _mapping(text: str) -> Mapping[str, Any]:
 
 
 def _param(tool: Tool, task: Mapping[str, Any], show: Callable[..., None]) -> int:
-    """List, get or set parameters."""
     who, name = task['node'], task.get('name')
     client = tool.parameters(who)
     known = tool.known_parameters(client, who)

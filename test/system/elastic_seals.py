@@ -263,7 +263,7 @@ def main() -> int:
         less = [100.0 * (1.0 - rms / found.without) for rms in found[1:]]
         worst = max(worst, *(rms / found.without for rms in found[2:]))
         print(
-            f'{name}: K {fit.presliding.stiffness:.3g} N/m +-{100.0 * fit.relative_stiffness_std:.2g} %, '
+            f'{name}: K {fit.presliding.stiffness:.3g} N/m +-{100.0 * fit.presliding.relative_std:.2g} %, '
             f'p {fit.presliding.yield_exponent:.2f}; RMS without {1e6 * found.without:.0f} um; less with rigid '
             f'{less[0]:.0f} %, elastic {less[1]:.0f} %, 0.7 K {less[2]:.0f} %, 1.3 K {less[3]:.0f} %; against the '
             f'motion {less[4]:.0f} %, 0.7 K {less[5]:.0f} %, 1.3 K {less[6]:.0f} %',

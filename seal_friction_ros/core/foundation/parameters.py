@@ -24,14 +24,11 @@ class Meaning:
     description: str
     lower: float | None = None
     upper: float | None = None
+    choices: Collection[str] = ()  # values of a text; empty: any
     live: bool = True
     symbol: str = ''  # in an equation
     start: Callable[[Any], float] | None = None  # first guess of a fit, from a `TypicalReading`; None: never fitted
     fit_bounds: tuple[float, float] | None = None  # bounds of a fit, where they are narrower
-
-    def bounds_text(self) -> str:
-        """Bounds as text, for example ``0.0 to 1.0``; empty without bounds."""
-        return '' if self.lower is None and self.upper is None else f'{self.lower} to {self.upper}'
 
 
 def parameter(default: Any = dataclasses.MISSING, **meaning: Any) -> Any:
@@ -63,13 +60,16 @@ class ParameterGroup(NamedTuple):
 
 
 def check(record: Any) -> None:
-    """Check the described fields of a dataclass instance against their bounds.
+    """Check the described fields of a dataclass instance against their bounds and choices.
 
-    ValueError: a number is not finite or out of bounds; the message names field, value, unit and bound.
+    ValueError: a number is not finite or out of bounds, or a text is none of its choices; the message names field,
+    value, unit and bound, or the choices.
     """
     for name, meaning in meanings(record).items():
         value = getattr(record, name)
         where = f'{type(record).__name__}.{name}'
+        if meaning.choices and value not in meaning.choices:
+            raise ValueError(f'{where} = {value!r} is none of {", ".join(meaning.choices)}')
         if isinstance(value, tuple):
             for i, item in enumerate(value):
                 _check_number(f'{where}[{i}]', item, meaning)
@@ -80,7 +80,7 @@ def check(record: Any) -> None:
 class CheckedParameters:
     """Base of a dataclass of `parameter` fields: `check` runs at construction, so an invalid record never exists.
 
-    ValueError: a number is not finite or out of bounds.
+    ValueError: a number is not finite or out of bounds, or a text is none of its choices.
     """
 
     def __post_init__(self) -> None:

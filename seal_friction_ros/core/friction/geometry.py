@@ -18,15 +18,15 @@ class SealGeometry(CheckedParameters):
     ring_inner_diameter: float = parameter(unit='m', lower=1e-4, upper=10.0, description='Free inner diameter, d_i.')
     rod_diameter: float = parameter(unit='m', lower=1e-4, upper=10.0, description='Inner wall: rod, or piston groove.')
     gland_diameter: float = parameter(unit='m', lower=1e-4, upper=10.0, description='Outer wall: gland, or bore.')
-    sliding_wall: str = parameter('rod', unit='', description='Wall the ring slides on: rod, or bore.')
+    sliding_wall: str = parameter(
+        'rod', unit='', choices=('rod', 'bore'), description='Wall the ring slides on: rod, or bore.'
+    )
     elastic_modulus: float = parameter(
         5.5e6, unit='Pa', lower=1e4, upper=1e10, description='Young modulus at small strain, E.'
     )
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.sliding_wall not in ('rod', 'bore'):
-            raise ValueError(f'SealGeometry.sliding_wall = {self.sliding_wall!r} is neither rod nor bore')
         self.check_order('gland_diameter', 'rod_diameter')
         if not 0.0 < squeeze(self) < 0.5:
             raise ValueError(

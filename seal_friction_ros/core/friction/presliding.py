@@ -34,7 +34,6 @@ from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.foundation.limits import between
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
-from seal_friction_ros.core.friction.states import BREAKAWAY, SLIDING, STUCK, StateFriction, sign, state_friction
 
 SLOTS = 6  # Largest number of elements: records of fixed size compile, and go into a snapshot.
 
@@ -220,30 +219,6 @@ def shear(numbers: PreslidingNumbers, state: Shear, slide: Slide) -> tuple[Shear
 
 
 @compilable
-def acting_friction(
-    numbers: PreslidingNumbers,
-    state: Shear,
-    force: float,
-    slide: Slide,
-    at_rest: bool,
-    velocity: float,
-    force_sum: float,
-) -> StateFriction:
-    """Friction that acts on the rod and its state, after `shear` made ``state`` and ``force`` [N] of ``slide``.
-
-    Sliding or breakaway where every element yields, stuck below. Rigid seals have the six states of `state_friction`,
-    with its arguments.
-    """
-    if math.isinf(numbers.stiffness):
-        coulomb = slide.coulomb_friction
-        return state_friction(velocity, force_sum, at_rest, coulomb + slide.sliding_excess, coulomb + slide.stiction)
-    direction = sign(force)
-    if abs(force) < slide.coulomb_friction + state.excess:
-        return StateFriction(STUCK, direction, force)
-    return StateFriction(BREAKAWAY if at_rest else SLIDING, direction, force)
-
-
-@compilable
 def relaxed(value: float, towards: float, passed: float, scale: float) -> float:
     """Value that relaxes exponentially towards another one; at once with a scale of 0."""
     if scale > 0.0:
@@ -260,18 +235,6 @@ def stored_energy(numbers: PreslidingNumbers, state: Shear) -> float:
         if 0.0 < stiffness < math.inf:
             energy += 0.5 * force * force / stiffness
     return energy
-
-
-@compilable
-def initial_loading(numbers: PreslidingNumbers, displacement: float, friction: float) -> float:
-    r"""Friction [N] over the first displacement of unsheared elements [m, >= 0], at a constant sliding friction [N].
-
-    .. math:: \Phi(x) = \sum_i \min(k_i x, w_i Y)
-
-    After a reversal at x_0 with a force F_0, :math:`F = F_0 \mp 2 \Phi(|x - x_0| / 2)` (Masing), until the branch meets
-    the one that it left (Madelung).
-    """
-    return element_forces(numbers, NO_ELEMENTS, displacement, friction)[1]
 
 
 class LuGreNumbers(NamedTuple):

@@ -16,10 +16,8 @@ ROUNDING = 1e-4  # [-] smallest eigenvalue of a correlation below 0 that is one 
 class TermCovariance(CheckedParameters):
     """Standard deviations of the parameters of one seal and their correlation, by the runs that they were fitted to.
 
-    The spread between runs is not in it: that is in the uncertainty of the seal.
-
-    Raises:
-        ValueError: A term is named twice, a number is missing or out of bounds, or no numbers can correlate like this.
+    The spread between runs is not in it: that is in the uncertainty of the seal. ValueError: A term is named twice, a
+    number is missing or out of bounds, or no numbers can correlate like this.
     """
 
     terms: tuple[str, ...] = parameter(unit='', description='Parameters of the law and of the velocity terms.')

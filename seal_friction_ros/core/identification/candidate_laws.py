@@ -31,24 +31,12 @@ class OperatingConditions(NamedTuple):
     """Operating conditions of n readings with k seals."""
 
     pressure: FloatArray  # [Pa, gauge, >= 0] of each seal, shape (n, k)
-    normal_force: FloatArray | None  # [N] of each seal, shape (n, k); None without geometry
     velocity: FloatArray  # [m/s] shape (n,); NaN if not measured
     direction: FloatArray  # -1.0 or 1.0, shape (n,)
 
     def taken(self, index: IntArray) -> 'OperatingConditions':
         """The readings in ``index``."""
-        normal_force = None if self.normal_force is None else self.normal_force[index]
-        return OperatingConditions(self.pressure[index], normal_force, self.velocity[index], self.direction[index])
-
-    def typical(self, friction: float) -> TypicalReading:
-        """Magnitudes that occur in the readings; ``friction`` is the mean of one seal [N]."""
-        speed = float(np.nanmax(np.abs(self.velocity), initial=0.0))
-        normal_force = math.nan if self.normal_force is None else float(self.normal_force.mean())
-        return TypicalReading(friction, float(self.pressure.max()), speed, normal_force)
-
-    def of_seals(self, columns: slice) -> 'OperatingConditions':
-        """What the seals in these columns see; without a normal force."""
-        return self._replace(pressure=self.pressure[:, columns], normal_force=None)
+        return OperatingConditions(*(column[index] for column in self))
 
 
 class SealKind(NamedTuple):
@@ -149,6 +137,13 @@ class CandidateLaw:
         """The velocity terms of one seal; None if the law has none."""
         return VelocityTerms(**{name: values[name] for name in self.velocity_terms}) if self.velocity_terms else None
 
+    def first_guess(self, at: OperatingConditions, friction: float) -> dict[str, float]:
+        """Value of each parameter to begin a fit with; ``friction`` is the mean of one seal [N]."""
+        normal_force = float(normal_forces(at.pressure, **self.parts).mean()) if self.parts else math.nan
+        speed = float(np.nanmax(np.abs(at.velocity), initial=0.0))
+        typical = TypicalReading(friction, float(at.pressure.max()), speed, normal_force)
+        return {parameter.name: parameter.start(typical) for parameter in self.parameters}
+
     def friction(self, at: OperatingConditions, values: ParameterValues) -> FloatArray:
         """Magnitude of the sliding friction of all seals [N], shape (n,)."""
         return np.asarray(self.frictions(at, values).sum(axis=1))
@@ -161,7 +156,7 @@ class CandidateLaw:
         """Magnitude of the friction of all seals of each kind [N], shape (n, kinds)."""
         columns = []
         for number, of_one in enumerate(self.of_one_seal(values)):
-            seen = at.of_seals(columns_of(self.kinds, number)) if self.kinds else at
+            seen = at._replace(pressure=at.pressure[:, columns_of(self.kinds, number)]) if self.kinds else at
             numbers = numbers_of_law(self.friction_law(of_one), self.terms(of_one) if with_speed else None)
             columns.append(friction_of_seals(numbers, seen))
         return np.column_stack(columns)
@@ -188,11 +183,11 @@ def _sum_over_seals(seal: Any, pressure: FloatArray, velocity: FloatArray, direc
 _compiled_sum = cache(lambda: compiled(_sum_over_seals))
 
 
-def normal_forces(pressure: FloatArray, geometry: SealGeometry, law: NormalForceLaw) -> FloatArray:
+def normal_forces(pressure: FloatArray, geometry: SealGeometry, normal_force_law: NormalForceLaw) -> FloatArray:
     """Normal force of each seal [N], shape (n, k), at ``pressure`` [Pa, gauge], shape (n, k)."""
     area = projected_area(geometry)
     distinct, back = np.unique(pressure, return_inverse=True)
-    forces = np.array([law.normal_force(float(p), area) for p in distinct])
+    forces = np.array([normal_force_law.normal_force(float(p), area) for p in distinct])
     return np.asarray(forces[back].reshape(pressure.shape))
 
 
@@ -278,7 +273,6 @@ def law_of_all_terms(variation: Variation, kinds: tuple[SealKind, ...] = ()) -> 
 
 
 def _with_exponent(law: CandidateLaw, suffix: str, exponent: float) -> CandidateLaw:
-    """The pressure power law with a fixed exponent."""
     parameters = tuple(p for p in law.parameters if p.name != 'pressure_exponent')
     power = {'1': '', '2': '^2'}.get(suffix, f'^({suffix.replace("_", "/")})')
     name, formula = f'{law.name}_{suffix}', law.formula.replace('^m', power)

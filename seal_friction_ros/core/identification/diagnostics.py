@@ -55,14 +55,13 @@ class CorrelatedPair(NamedTuple):
     correlation: float
 
 
-def collinear_regressors(readings: FrictionReadings, chamber_pressures: FloatArray) -> list[CorrelatedPair]:
+def collinear_regressors(readings: FrictionReadings) -> list[CorrelatedPair]:
     """Pairs of regressors whose correlation is above `COLLINEAR`.
 
     Speed and seal pressure determine viscous and pressure-dependent friction; velocity and pressure difference
     determine viscous friction and an area error. Readings at held pressures are averaged over each pressure first.
-    ``chamber_pressures`` [Pa] are those of chambers a and b, shape (n, 2).
     """
-    velocity = readings.at.velocity
+    velocity, chamber_pressures = readings.at.velocity, readings.chamber_pressures
     if not np.isfinite(velocity).all():
         return []
     found = []

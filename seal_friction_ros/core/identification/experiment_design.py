@@ -193,7 +193,7 @@ class _Design:
         direction = np.tile(np.array(DIRECTIONS, dtype=np.float64), len(points))
         seals = self.model.problem.readings.at.pressure.shape[1]
         of_seals = np.repeat(pressure[:, np.newaxis], seals, axis=1)
-        return OperatingConditions(of_seals, None, direction * speed, direction)
+        return OperatingConditions(of_seals, direction * speed, direction)
 
     def _slopes(self, at: OperatingConditions) -> FloatArray:
         """Derivative of the friction [N] by each parameter that readings tell, shape (n, parameters)."""

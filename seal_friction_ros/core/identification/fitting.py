@@ -108,8 +108,7 @@ def fit(law: CandidateLaw, readings: FrictionReadings, start_values: ParameterVa
         return np.asarray((readings.magnitudes(offsets_of(readings, friction)) - friction) / readings.scale)
 
     mean_friction = float(np.abs(readings.force).mean() / readings.at.pressure.shape[1])  # [N] of one seal
-    typical = readings.at.typical(mean_friction)
-    first_guess = {p.name: p.start(typical) for p in law.parameters}
+    first_guess = law.first_guess(readings.at, mean_friction)
     start = first_guess | {name: value for name, value in (start_values or {}).items() if name in first_guess}
     inside = np.clip(list(start.values()), lower, upper)
     size = np.maximum(np.abs(inside), 1e-3 * np.minimum(upper, 1.0))

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import stdtrit
 
-from seal_friction_ros.core.identification.readings import NARROWEST_PRESSURES, PreparedReadings
+from seal_friction_ros.core.identification.readings import NARROWEST_PRESSURES, FrictionReadings
 from seal_friction_ros.core.identification.signal_preparation import OffsetLine, Signals, offset_line
 
 CONFIDENCE = 0.995  # one-sided, that the offset follows the pressure (our choice)
@@ -33,7 +33,7 @@ class ForceCorrection(NamedTuple):
         return signals._replace(force_sum=signals.force_sum + change)
 
 
-def force_correction(prepared: PreparedReadings) -> ForceCorrection | None:
+def force_correction(readings: FrictionReadings) -> ForceCorrection | None:
     """Area error from a line through the offsets of the force sum over the pressure.
 
     The offset of a level is half the sum of its two directions, in which friction cancels. A wrong area adds a share of
@@ -42,14 +42,14 @@ def force_correction(prepared: PreparedReadings) -> ForceCorrection | None:
     None for swept logs and manual readings, fewer than three pressures, and if both chambers are under pressure, so
     that it is not known whose area is wrong.
     """
-    readings, levels = prepared.readings, prepared.readings.levels
+    levels = readings.levels
     if not readings.samples or len(levels) < 3:
         return None
-    spans = np.ptp(prepared.chamber_pressures, axis=0)
+    spans = np.ptp(readings.chamber_pressures, axis=0)
     if np.count_nonzero(spans > NARROWEST_PRESSURES) != 1:
         return None
     number = int(np.argmax(spans))
-    pressure = readings.level_means(prepared.chamber_pressures[:, number])
+    pressure = readings.level_means(readings.chamber_pressures[:, number])
     friction, offset = readings.half_ranges
     line = offset_line(pressure, offset)
     freedom = len(levels) - 2

@@ -180,12 +180,6 @@ class ModelFit:
         """Standard error of `parts` [N], shape (kinds,)."""
         return np.asarray(np.sqrt(np.diag(self.covariance)[1 : 1 + len(self.columns)]) * self.size)
 
-    @property
-    def surest_area(self) -> float:
-        """Standard errors by which an area of the force sum is off [-]."""
-        both = self.layout.areas
-        return float((np.abs(self.vector[both]) / np.sqrt(np.diag(self.covariance)[both])).max())
-
     def friction(self, at: OperatingConditions) -> FloatArray:
         """Magnitude of the friction of all seals [N], shape (n,)."""
         return _magnitude(self.problem, self.vector, at)[0]
@@ -233,14 +227,14 @@ def _magnitude(problem: Problem, vector: FloatArray, at: OperatingConditions) ->
     return size * side[:, 0] * symmetric, size * slopes
 
 
-def _problem(
-    readings: FrictionReadings, columns: Sequence[Columns], told: Told, chamber_pressures: FloatArray | None
-) -> Problem:
+def _problem(readings: FrictionReadings, columns: Sequence[Columns], told: Told) -> Problem:
     two_sided = np.array([s for s, index in enumerate(readings.two_sided) if len(index)], dtype=np.int64)
     size = max(float(np.abs(readings.magnitudes(readings.offsets)).mean()), 1e-12)
     speed = max(float(np.nan_to_num(np.abs(readings.at.velocity)).mean()), 1e-9)
-    highest = np.ones(2) if chamber_pressures is None else np.maximum(np.abs(chamber_pressures).max(axis=0), 1.0)
-    both = np.zeros((readings.count, 2)) if chamber_pressures is None else chamber_pressures / highest
+    highest, both = np.ones(2), np.zeros((readings.count, 2))
+    if told.areas:
+        highest = np.maximum(np.abs(readings.chamber_pressures).max(axis=0), 1.0)
+        both = readings.chamber_pressures / highest
     free = size * np.column_stack((both, readings.source[:, np.newaxis] == two_sided))
     prior = [FRICTION_PRIOR] * (1 + len(columns))
     prior += [VISCOUS_PRIOR if told.viscous else NOT_TOLD, STRIBECK_PRIOR if told.stribeck else NOT_TOLD]
@@ -317,21 +311,14 @@ def _weights(readings: FrictionReadings, residual: FloatArray, size: float, fitt
     return np.asarray(1.0 / (np.maximum(readings.scale, 1e-3 * size) * np.sqrt(variance))), scatter
 
 
-def fit_model(
-    readings: FrictionReadings,
-    columns: Sequence[Columns],
-    told: Told,
-    chamber_pressures: FloatArray | None = None,
-    near: FloatArray | None = None,
-) -> ModelFit:
+def fit_model(readings: FrictionReadings, columns: Sequence[Columns], told: Told) -> ModelFit:
     """Most probable parameters and their covariance, with Stribeck friction and asymmetry where they are more probable.
 
     The ``columns`` of the pressures are the seals of each kind; none for a friction without pressure. Terms that are
-    not ``told`` are 0. The pressures of chambers a and b [Pa], shape (n, 2), give errors of the areas. The fit starts
-    ``near`` the vector of one to similar readings.
+    not ``told`` are 0.
     """
-    problem = _problem(readings, columns, told, chamber_pressures)
-    vector = near if near is not None and len(near) == len(problem.prior) else _start(problem)
+    problem = _problem(readings, columns, told)
+    vector = _start(problem)
     scatter = CLUSTER_PRIOR
     weight = 1.0 / (np.maximum(readings.scale, 1e-3 * problem.size) * scatter)
     for _ in range(2):
@@ -342,7 +329,7 @@ def fit_model(
         fitted = len(vector) - float(np.sum(np.diag(fit.covariance) / problem.prior[:, 1] ** 2))
         weight, scatter = _weights(readings, residual, problem.size, fitted)
     choices = [
-        _problem(readings, columns, told._replace(stribeck=falling, asymmetry=uneven), chamber_pressures)
+        _problem(readings, columns, told._replace(stribeck=falling, asymmetry=uneven))
         for falling in sorted({told.stribeck, False})
         for uneven in sorted({told.asymmetry, False})
     ]
@@ -369,9 +356,7 @@ def without_group(fit: ModelFit, out: BoolArray) -> ModelFit:
     return replace(fit, vector=vector)
 
 
-def left_out(
-    fit: ModelFit, readings: FrictionReadings, chamber_pressures: FloatArray | None = None
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def left_out(fit: ModelFit, readings: FrictionReadings) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Predicted friction and what it is off by [N], shape (n,) each, and the vectors, each group by the others.
 
     A source that is in the left-out group alone gets its offset from its own readings in both directions.
@@ -381,8 +366,6 @@ def left_out(
         others, tested = without_group(fit, out), readings.taken(out)
         predicted[out] = others.friction(tested.at)
         rest = tested.force - tested.at.direction * predicted[out]
-        if chamber_pressures is not None:
-            rest = rest - chamber_pressures[out] @ others.areas
         offsets = tested.offsets_with_own(others.offsets, rest, readings.source[~out])
         signed[out] = tested.at.direction * (rest - offsets[tested.source])
         vectors.append(others.vector)

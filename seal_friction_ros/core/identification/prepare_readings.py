@@ -53,10 +53,10 @@ def prepare_logs(logs: Sequence[RecordedLog], chambers: Sequence[str]) -> Prepar
     for i, stroke in of_strokes:
         used[i][stroke.samples] = True
     if sum(part.sum() for part in used) < HELD_LOG * sum(part.sum() for part in even):
-        readings, chamber_pressures = _swept(logs, even, chambers)
+        readings = _swept(logs, even, chambers)
         breakaway, used = None, even
     else:
-        readings, chamber_pressures = _held(logs, of_strokes, chambers)
+        readings = _held(logs, of_strokes, chambers)
         breakaway = _breakaway(logs, chambers, readings)
     free = free_rod([log.signals for log in logs], even)
     if free is not None:
@@ -65,7 +65,7 @@ def prepare_logs(logs: Sequence[RecordedLog], chambers: Sequence[str]) -> Prepar
         breakaway = breakaway and replace(breakaway, free_rod=free, level=np.zeros_like(breakaway.level))
     check_readings(readings)
     accounts = tuple(_account(log, *masks) for log, *masks in zip(logs, even, used, strict=True))
-    return PreparedReadings(readings, chamber_pressures, breakaway, accounts)
+    return PreparedReadings(readings, breakaway, accounts)
 
 
 def _seal_pressures(chamber_pressures: FloatArray, chambers: Sequence[str]) -> FloatArray:
@@ -79,11 +79,11 @@ def _columns(rows: _Rows, chambers: Sequence[str]) -> tuple[OperatingConditions,
     columns = [(r.velocity, r.direction, r.force_sum, r.pressure_a, r.pressure_b) for _, r in rows]
     velocity, direction, force, *both = np.array(columns, dtype=np.float64).T
     pressures = np.column_stack(both)
-    at = OperatingConditions(_seal_pressures(pressures, chambers), None, velocity, direction)
+    at = OperatingConditions(_seal_pressures(pressures, chambers), velocity, direction)
     return at, pressures, force, source
 
 
-def _held(logs: Sequence[RecordedLog], rows: _Rows, chambers: Sequence[str]) -> tuple[FrictionReadings, FloatArray]:
+def _held(logs: Sequence[RecordedLog], rows: _Rows, chambers: Sequence[str]) -> FrictionReadings:
     at, pressures, force, source = _columns(rows, chambers)
     held = at.pressure.mean(axis=1)
     for number in np.unique(source):
@@ -96,8 +96,8 @@ def _held(logs: Sequence[RecordedLog], rows: _Rows, chambers: Sequence[str]) -> 
     ways = [_travel(log.signals) for log in logs]
     travel = np.array([ways[number][r.samples].mean() for number, r in rows])
     readings = FrictionReadings(at, force, source, group, level, names, by, False, samples, travel)
-    readings = replace(readings, temperature=_temperatures(logs, rows))
-    return with_predictable_groups(readings), pressures
+    readings = replace(readings, temperature=_temperatures(logs, rows), chamber_pressures=pressures)
+    return with_predictable_groups(readings)
 
 
 def _travel(signals: signal_preparation.Signals) -> FloatArray:
@@ -132,15 +132,23 @@ def _breakaway(
     rows = [(i, peak) for i, log in enumerate(logs) for peak in signal_preparation.breakaways(log.signals, log.sliding)]
     if not rows:
         return None
-    at, _, force, source = _columns(rows, chambers)
+    at, pressures, force, source = _columns(rows, chambers)
     level = _nearest_level(at.pressure.mean(axis=1), dynamic)
     parts = source if len(np.unique(source)) > 1 else contiguous_parts(PARTS, source, level)
     group = level if dynamic.left_out_by == 'pressure' else parts
-    found = replace(
-        dynamic, at=at, force=force, source=source, group=group, level=level, samples=(), travel=np.empty(0)
+    return replace(
+        dynamic,
+        at=at,
+        force=force,
+        source=source,
+        group=group,
+        level=level,
+        samples=(),
+        travel=np.empty(0),
+        dwell=np.array([peak.dwell for _, peak in rows]),
+        temperature=_temperatures(logs, rows),
+        chamber_pressures=pressures,
     )
-    dwell = np.array([peak.dwell for _, peak in rows])
-    return replace(found, temperature=_temperatures(logs, rows), dwell=dwell)
 
 
 def _groups(level: IntArray, part: IntArray, kind: str) -> tuple[IntArray, str]:
@@ -157,9 +165,7 @@ def _nearest_level(pressure: FloatArray, dynamic: FrictionReadings) -> IntArray:
     return np.asarray(np.array(list(dynamic.levels))[nearest])
 
 
-def _swept(
-    logs: Sequence[RecordedLog], even: Sequence[BoolArray], chambers: Sequence[str]
-) -> tuple[FrictionReadings, FloatArray]:
+def _swept(logs: Sequence[RecordedLog], even: Sequence[BoolArray], chambers: Sequence[str]) -> FrictionReadings:
     counts = [int(index.sum()) for index in even]
     if min(counts) < FEWEST_SWEPT:
         raise ValueError(
@@ -178,8 +184,8 @@ def _swept(
     pressure = _seal_pressures(both, chambers)
     mean = pressure.mean(axis=1)
     edges = np.quantile(mean, np.linspace(0.0, 1.0, BLOCKS + 1)[1:-1])
-    readings = FrictionReadings(
-        at=OperatingConditions(pressure, None, joined.velocity, np.sign(joined.velocity)),
+    return FrictionReadings(
+        at=OperatingConditions(pressure, joined.velocity, np.sign(joined.velocity)),
         force=joined.force_sum,
         source=np.repeat(np.arange(len(parts)), counts),
         group=np.concatenate([i * BLOCKS + np.arange(n) * BLOCKS // n for i, n in enumerate(counts)]),
@@ -188,8 +194,8 @@ def _swept(
         left_out_by='block',
         are_samples=True,
         temperature=np.concatenate(warm) if len(warm) == len(logs) else np.empty(0),
+        chamber_pressures=both,
     )
-    return readings, both
 
 
 def _account(log: RecordedLog, even: BoolArray, used: BoolArray) -> Account:
@@ -219,7 +225,7 @@ def prepare_manual_readings(
         if several and (readings.left_out_by == 'pressure' or breakaway.left_out_by != 'test'):
             breakaway = replace(breakaway, group=breakaway.level, left_out_by='pressure')
     accounts = tuple(Account(manual.name, len(manual.friction), {}) for manual in dynamic)
-    return PreparedReadings(readings, np.repeat(readings.at.pressure[:, :1], 2, axis=1), breakaway, accounts)
+    return PreparedReadings(readings, breakaway, accounts)
 
 
 def _joined(sources: Sequence[ManualReadings], seals: int) -> FrictionReadings:
@@ -229,8 +235,9 @@ def _joined(sources: Sequence[ManualReadings], seals: int) -> FrictionReadings:
     source = np.repeat(np.arange(len(sources)), [len(manual.friction) for manual in sources])
     level = signal_preparation.pressure_levels(of_seals[:, 0])
     group, by = _groups(level, numbered(source, test), 'test')
-    at = OperatingConditions(of_seals, None, direction * velocity, direction.astype(np.float64))
+    at = OperatingConditions(of_seals, direction * velocity, direction.astype(np.float64))
     readings = FrictionReadings(at, direction * friction, source, group, level, names, by, are_samples=False)
+    readings = replace(readings, chamber_pressures=np.repeat(of_seals[:, :1], 2, axis=1))
     if all(dwell is not None for dwell in dwells):
         readings = replace(readings, dwell=np.concatenate(dwells))
     return with_predictable_groups(readings)

@@ -83,7 +83,6 @@ class PreslidingFit:
     friction: tuple[float, ...]  # [N] f_c of each log
     offset: tuple[float, ...]  # [N] o of each log
     excess: float  # [-] epsilon; 0 if the logs show no lag
-    relative_stiffness_std: float  # [-]
     yield_exponent_std: float
     relative_memory_length_std: float  # [-] NaN if there is no lag
     relative_dwell_time_std: float  # [-] NaN if the rests do not tell it
@@ -385,7 +384,6 @@ def fit_curves(curves: Sequence[ReversalCurve], names: Sequence[str], length: fl
         friction=tuple(found.parameters[_START_OF_LOGS::2].tolist()),
         offset=tuple(found.parameters[_START_OF_LOGS + 1 :: 2].tolist()),
         excess=excess,
-        relative_stiffness_std=float(errors[0]),
         yield_exponent_std=float(errors[1]),
         relative_memory_length_std=float(errors[3]),
         relative_dwell_time_std=float(errors[4]),

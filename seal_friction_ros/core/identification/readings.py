@@ -87,7 +87,7 @@ class FrictionReadings:
     travel: FloatArray = field(default_factory=_unknown)  # [m] of the rod since the start of its source, shape (n,)
     dwell: FloatArray = field(default_factory=_unknown)  # [s] time at rest before each breakaway, shape (n,)
     temperature: FloatArray = field(default_factory=_unknown)  # [K] shape (n,)
-    chamber_pressures: FloatArray = field(default_factory=_unknown)  # [Pa] of a and b, (n, 2); empty for one kind
+    chamber_pressures: FloatArray = field(default_factory=_unknown)  # [Pa] of chambers a and b, shape (n, 2)
     kinds: tuple[SealKind, ...] = ()  # of the seals, in the order of the pressures; empty: one kind
     free_rod: FreeRod | None = None  # if the pressures are the effect of the friction, and tell nothing of it
 
@@ -245,7 +245,6 @@ class PreparedReadings(NamedTuple):
     """Readings of all sources."""
 
     readings: FrictionReadings
-    chamber_pressures: FloatArray  # [Pa] of chambers a and b at each reading, shape (n, 2)
     breakaway: FrictionReadings | None  # None if no motion starts from rest
     accounts: tuple[Account, ...]  # samples of each source
 
@@ -369,7 +368,6 @@ def are_far_apart(pressures: FloatArray) -> bool:
 
 
 def _check_pressures(where: str, readings: FrictionReadings) -> None:
-    """Check readings that do not show how friction depends on pressure."""
     if has_pressures(readings) or readings.free_rod is not None:
         return
     pressures = readings.seal_pressure

@@ -31,14 +31,12 @@ NOTICED = 0.05  # [-] standard deviation of the friction from which a condition 
 SURE_AREA = 4.0  # standard errors of an area of the force sum from which it is corrected (our choice)
 
 
-def kinds_readings(
-    readings: FrictionReadings, chamber_pressures: FloatArray, kinds: Sequence[SealKind]
-) -> FrictionReadings:
+def kinds_readings(readings: FrictionReadings, kinds: Sequence[SealKind]) -> FrictionReadings:
     """Readings of several kinds, whose levels are conditions: each combination of held pressures of the kinds.
 
     Those of swept logs stay.
     """
-    found = replace(readings, chamber_pressures=chamber_pressures, kinds=tuple(kinds))
+    found = replace(readings, kinds=tuple(kinds))
     if readings.are_samples:
         return found
     levels = []
@@ -57,9 +55,11 @@ def area_errors(readings: FrictionReadings, told: Told) -> ForceCorrection | Non
     if not (np.ptp(readings.chamber_pressures, axis=0) > NARROWEST_PRESSURES).any():
         return None
     columns = [columns_of(readings.kinds, number) for number in range(len(readings.kinds))]
-    model = fit_model(readings, columns, told._replace(areas=True), readings.chamber_pressures)
+    model = fit_model(readings, columns, told._replace(areas=True))
     area_a, area_b = (-model.areas).tolist()
-    return ForceCorrection((area_a, area_b), model.surest_area > SURE_AREA)
+    both = model.layout.areas
+    errors = np.sqrt(np.diag(model.covariance)[both])
+    return ForceCorrection((area_a, area_b), float((np.abs(model.vector[both]) / errors).max()) > SURE_AREA)
 
 
 class ToldApart(NamedTuple):
@@ -148,7 +148,7 @@ def _grid(readings: FrictionReadings) -> tuple[list[ChamberPressures], Operating
     grid = [ChamberPressures(a * high, b * high) for a, b in product((0.0, 0.5, 1.0), repeat=2)]
     seen = pressures_at_seals([chamber for kind in readings.kinds for chamber in kind.chambers], *np.array(grid).T)
     speed = float(np.nan_to_num(np.abs(readings.at.velocity)).mean())
-    return grid, OperatingConditions(seen, None, np.full(len(grid), speed), np.ones(len(grid)))
+    return grid, OperatingConditions(seen, np.full(len(grid), speed), np.ones(len(grid)))
 
 
 def proposed_conditions(

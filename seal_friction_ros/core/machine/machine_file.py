@@ -419,13 +419,11 @@ def _spring(document: Any, where: str) -> Spring:
 
 
 def _check_names(document: Any, names: Collection[str], where: str) -> None:
-    """Check that a document is a mapping with none but these names."""
     check_mapping(document, where)
     check_names(document, names, where)
 
 
 def _check_keys(document: Any, keys: tuple[str, ...], where: str) -> None:
-    """Check that a document is a mapping with all of these keys, and no other."""
     _check_names(document, keys, where)
     missing = [key for key in keys if key not in document]
     if missing:
@@ -491,7 +489,6 @@ def _flat(values: Mapping[Any, Any], above: str = '') -> dict[str, Any]:
 
 
 def _check_actuator(actuator: Actuator, where: str) -> None:
-    """Check that the parts of an actuator fit each other."""
     inputs = actuator.inputs
     _check_pressures(actuator, where)
     for key in ('velocity', 'reference_velocity', 'reference_position', 'temperature'):

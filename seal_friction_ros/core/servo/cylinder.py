@@ -8,7 +8,6 @@ from seal_friction_ros.core.foundation.units import INCH
 
 AMBIENT = 101325.0  # [Pa, absolute] zero of gauge pressure
 BALANCED, SINGLE_ROD = 'balanced', 'single_rod'
-CYLINDER_TYPES = (BALANCED, SINGLE_ROD)
 """Values of `Cylinder.type`. Balanced: the rod goes through both ends, so both chambers have the annular area."""
 
 
@@ -23,7 +22,9 @@ class Cylinder(CheckedParameters):
     too small.
     """
 
-    type: str = parameter(BALANCED, unit='', description='balanced (two equal areas) or single_rod.')
+    type: str = parameter(
+        BALANCED, unit='', choices=(BALANCED, SINGLE_ROD), description='balanced (two equal areas) or single_rod.'
+    )
     rod_diameter: float = parameter(0.625 * INCH, unit='m', lower=1e-4, upper=1.0, description='Rod diameter.')
     bore_diameter: float = parameter(0.75 * INCH, unit='m', lower=1e-4, upper=2.0, description='Bore diameter.')
     stroke: float = parameter(0.05, unit='m', lower=1e-4, upper=10.0, description='Distance between the stops.')
@@ -41,8 +42,6 @@ class Cylinder(CheckedParameters):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.type not in CYLINDER_TYPES:
-            raise ValueError(f'Cylinder.type = {self.type!r} is none of {", ".join(CYLINDER_TYPES)}')
         self.check_order('bore_diameter', 'rod_diameter')
         swept = self.area_a * self.stroke
         if self.dead_volume < 0.01 * swept:

@@ -34,10 +34,6 @@ PLANT: dict[str, type[Any]] = {
 VALVES: dict[str, type[Any]] = {'hydraulic': ServoValve, 'pneumatic': PneumaticValve}
 """Valve of the plant, by the value of ``fluid``."""
 
-MESSAGES = ('own', 'standard')
-REFERENCE_MESSAGES = ('joint_state', 'trajectory_point')
-FEEDFORWARD_MESSAGES = ('own', 'joint_state', 'array')
-
 
 @dataclass(frozen=True)
 class SimulatorSettings(CheckedParameters):
@@ -50,23 +46,26 @@ class SimulatorSettings(CheckedParameters):
     wave: str = parameter(
         'sine',
         unit='',
+        choices=(*WAVES, 'topic', 'pull_test'),
         description='Reference: sine, step, trapezoid, chirp; topic; or pull_test, a rig without servo.',
     )
     reference_resolution: float = parameter(
         0.0, unit='m', lower=0.0, upper=0.1,
         description='Step of the positions of sine to chirp; their differences are its velocity. 0: continuous.'
     )  # fmt: skip
-    fluid: str = parameter('hydraulic', unit='', live=False, description='hydraulic, or pneumatic: pneumatic_valve.')
+    fluid: str = parameter(
+        'hydraulic', unit='', choices=VALVES, live=False, description='hydraulic, or pneumatic: pneumatic_valve.'
+    )
     seal_elasticity: str = parameter(
-        RIGID, unit='', live=False,
+        RIGID, unit='', choices=ELASTICITIES, live=False,
         description='Seals of the plant: rigid; elements: presliding of the seal files; lugre: LuGre as stiff as those.'
     )  # fmt: skip
     messages: str = parameter(
-        'own', unit='', live=False,
+        'own', unit='', choices=('own', 'standard'), live=False,
         description='own: the messages of this package; standard: those of sensor_msgs and geometry_msgs only.'
     )  # fmt: skip
     feedforward_message: str = parameter(
-        'own', unit='', live=False,
+        'own', unit='', choices=('own', 'joint_state', 'array'), live=False,
         description='own: friction_feedforward; joint_state: effort of the joint in effort_command; array: first value '
         'of effort_commands, as a controller of efforts takes it.'
     )  # fmt: skip
@@ -96,15 +95,6 @@ class SimulatorSettings(CheckedParameters):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name, choices in (
-            ('wave', (*WAVES, 'topic', 'pull_test')),
-            ('fluid', tuple(VALVES)),
-            ('seal_elasticity', ELASTICITIES),
-            ('messages', MESSAGES),
-            ('feedforward_message', FEEDFORWARD_MESSAGES),
-        ):
-            if getattr(self, name) not in choices:
-                raise ValueError(f'SimulatorSettings.{name} = {getattr(self, name)!r} is none of {", ".join(choices)}')
         if self.messages == 'standard' and self.wave not in WAVES:
             raise ValueError(f'SimulatorSettings.wave = {self.wave!r} needs messages: own')
         if self.time_factor != 1.0 and not self.publish_clock:
@@ -123,16 +113,14 @@ class StandardMessages(CheckedParameters):
     velocity: bool = parameter(True, unit='', description='false: joint_states has positions only, as of an encoder.')
     load_cell: bool = parameter(True, unit='', description='false: no load_cell, an axis without force sensor.')
     reference: str = parameter(
-        'joint_state', unit='', description='joint_state: joint_reference; trajectory_point: reference_point.'
-    )
+        'joint_state', unit='', choices=('joint_state', 'trajectory_point'),
+        description='joint_state: joint_reference; trajectory_point: reference_point.'
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.joint:
             raise ValueError('StandardMessages.joint is empty: give the joint a name')
-        if self.reference not in REFERENCE_MESSAGES:
-            choices = ', '.join(REFERENCE_MESSAGES)
-            raise ValueError(f'StandardMessages.reference = {self.reference!r} is none of {choices}')
 
 
 def servo_parameters(

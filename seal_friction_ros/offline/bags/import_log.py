@@ -79,7 +79,6 @@ class ReadLog(NamedTuple):
     samples: Samples
     columns: dict[Term, FloatArray]  # values in the log, in the units of the terms
     position: FloatArray | None = None  # [m] shape (n,); None if the rig file has none
-    temperature: FloatArray | None = None  # [K] likewise
     track: Track = NO_TRACK  # what the bag gets
     dropped: Mapping[str, int] = {}  # reason -> rows that are left out
     remarks: tuple[str, ...] = ()  # what looks wrong
@@ -98,7 +97,7 @@ def read_samples(log: Path, rig: Rig) -> ReadLog:
     count = cells.dropped.counts.total()
     lost = [f'{text}: {cells.dropped.first}' for text in _share_text('left out', count, count + len(cells.stamps))]
     remarks = (*lost, *_pressure_remarks(rig, samples))
-    return ReadLog(samples, cells.columns, places, warm, track, cells.dropped.counts, remarks)
+    return ReadLog(samples, cells.columns, places, track, cells.dropped.counts, remarks)
 
 
 def _share_text(what: str, count: int, rows: int) -> list[str]:

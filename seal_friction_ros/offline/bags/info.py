@@ -137,7 +137,6 @@ def _estimates(message: BagMessage) -> list[FrictionEstimate]:
 
 
 def _seals(text: str) -> list[str]:
-    """Each seal with its chamber in the text of a configuration, of a machine with the name of its actuator."""
     return [
         f'{name}: {seal} on chamber {chamber}'.removeprefix(': ')
         for name, one in parse_machine_text(text).configurations.items()

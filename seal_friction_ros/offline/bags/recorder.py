@@ -10,6 +10,7 @@ a due bag with `Recorder.begin_next` and a snapshot, so that each bag replays al
 """
 
 import errno
+import re
 import shutil
 import threading
 import time
@@ -19,8 +20,8 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from seal_friction_ros.offline.bags.bag import BagError, BagWriter, timed_name
-from seal_friction_ros.offline.bags.retention import delete_oldest
+from seal_friction_ros.files import read_yaml
+from seal_friction_ros.offline.bags.bag import LARGEST_METADATA, START_IN_NAME, BagError, BagWriter, timed_name
 
 QUEUE_LENGTH = 100_000  # [messages] fourteen seconds of seven topics at 1 kHz
 FLUSH_PERIOD = 0.3  # [s]
@@ -206,7 +207,6 @@ class Recorder:
         return None
 
     def _begin(self, following: _NextBag) -> bool:
-        """Make the next bag; whether it could be made."""
         self._present += 1
         try:
             self._writer = self._make(following.path)
@@ -274,3 +274,35 @@ class Recorder:
         if self._keep_size and self._owner:
             with suppress(OSError):
                 delete_oldest(self.path.parent, self._owner, self._keep_size - self._keep_size // BAGS_KEPT)
+
+
+def delete_oldest(folder: Path, owner: str, largest: int) -> None:
+    """Delete the oldest finished bags of a recorder until the remaining ones have at most ``largest`` [bytes].
+
+    A bag counts if its name ends like that of `timed_name`, its ``metadata.yaml`` says that ``owner`` finished it, and
+    its folder contains nothing but that file and its MCAP files. Everything else stays: bags with another name,
+    unfinished bags, folders with another file in them, and links. Raises OSError if ``folder`` cannot be read.
+    """
+    total = 0
+    bags = [path for path in folder.iterdir() if START_IN_NAME.search(path.name) and _is_finished_by(path, owner)]
+    for bag in sorted(bags, key=lambda path: path.name[-22:], reverse=True):
+        with suppress(OSError):  # the other bags count as well
+            files = list(bag.glob('*.mcap'))
+            total += sum(file.stat().st_size for file in files)
+            if total > largest:
+                for file in (*files, bag / 'metadata.yaml'):
+                    file.unlink()
+                bag.rmdir()
+
+
+def _is_finished_by(bag: Path, owner: str) -> bool:
+    name = re.compile(rf'{re.escape(bag.name)}_[0-9]+\.mcap')
+    try:
+        if bag.is_symlink() or not all(
+            path.name == 'metadata.yaml' or name.fullmatch(path.name) for path in bag.iterdir()
+        ):
+            return False
+        about = read_yaml(bag / 'metadata.yaml', LARGEST_METADATA)['rosbag2_bagfile_information']['custom_data']
+        return bool(about['recorded_by'] == owner and 'dropped_messages' in about)
+    except (OSError, ValueError, LookupError, TypeError):
+        return False

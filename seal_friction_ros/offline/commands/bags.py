@@ -86,7 +86,6 @@ def run_replay(arguments: argparse.Namespace) -> int:
 
 
 def _run_many(arguments: argparse.Namespace) -> int:
-    """Several bags: one line for each, and the exit code of the worst."""
     from seal_friction_ros.offline.replay.parallel_replay import replay_many
     from seal_friction_ros.offline.replay.replay import chosen_configuration
 

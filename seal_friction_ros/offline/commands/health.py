@@ -3,10 +3,13 @@
 import argparse
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from seal_friction_ros.offline.commands import command_line as cli
 from seal_friction_ros.offline.work.targets import SEAL_FILE, TABLE
+
+if TYPE_CHECKING:
+    from seal_friction_ros.offline.replay.bag_parts import Chosen
 
 
 def add_parser(commands: Any) -> None:
@@ -46,19 +49,24 @@ _LIMITS: dict[str, tuple[str, cli.Settings]] = {
 }
 
 
+def _chosen(arguments: argparse.Namespace, **more: Any) -> 'Chosen':
+    from seal_friction_ros.offline.replay.bag_parts import Chosen
+    from seal_friction_ros.offline.replay.replay import chosen_configuration
+
+    override = chosen_configuration(arguments.params, arguments.seal)
+    return Chosen(arguments.namespace, cli.mapping_of(arguments), override, **more)
+
+
 def run_health(arguments: argparse.Namespace) -> int:
     """Follow the bags in order of time."""
     from seal_friction_ros.core.estimation.findings import Limits
     from seal_friction_ros.core.identification.admission import Account
     from seal_friction_ros.offline.replay.bag_health import health_of_bags
-    from seal_friction_ros.offline.replay.replay import chosen_configuration
     from seal_friction_ros.offline.reports.health_report import write_health_report
 
-    override = chosen_configuration(arguments.params, arguments.seal)
-    workers, kept = cli.workers_of(arguments), cli.kept_in(arguments)
     limits = Limits(arguments.scale_low, arguments.scale_high, arguments.breakaway, arguments.noise)
-    mapping = cli.mapping_of(arguments)
-    outcomes = health_of_bags(arguments.bags, arguments.namespace, override, workers, kept, mapping, limits)
+    chosen = _chosen(arguments, limits=limits)
+    outcomes = health_of_bags(arguments.bags, chosen, cli.workers_of(arguments), cli.kept_in(arguments))
     errors = [outcome.error for outcome in outcomes if outcome.error]
     seen = [(outcome.result, bag) for outcome, bag in zip(outcomes, arguments.bags, strict=True) if outcome.result]
     seen.sort(key=lambda pair: pair[0].time[0] if len(pair[0].time) else 0.0)
@@ -91,20 +99,15 @@ def run_fleet(arguments: argparse.Namespace) -> int:
     """Summarise every bag; write page and table."""
     from seal_friction_ros.core.estimation.findings import GOOD
     from seal_friction_ros.offline.bags.find_bags import find_bags
-    from seal_friction_ros.offline.replay.bag_parts import Chosen
     from seal_friction_ros.offline.replay.bag_summary import DIFFERENT, summaries
-    from seal_friction_ros.offline.replay.replay import chosen_configuration
     from seal_friction_ros.offline.reports.fleet_report import judged, rigs_of, write_fleet_report
     from seal_friction_ros.offline.reports.fleet_table import write_fleet_table
     from seal_friction_ros.packages import needed
 
     if arguments.parquet:
         needed('pyarrow')
-    override = chosen_configuration(arguments.params, arguments.seal)
-    chosen = Chosen(arguments.namespace, cli.mapping_of(arguments), override)
-    workers, kept = cli.workers_of(arguments), cli.kept_in(arguments)
-    paths = find_bags(arguments.where)
-    outcomes = summaries(paths, chosen, workers, kept)
+    chosen, paths = _chosen(arguments), find_bags(arguments.where)
+    outcomes = summaries(paths, chosen, cli.workers_of(arguments), cli.kept_in(arguments))
     bags = [judged(path, outcome) for path, outcome in zip(paths, outcomes, strict=True)]
     report = write_fleet_report(bags, arguments.where, arguments.out)
     if arguments.parquet:

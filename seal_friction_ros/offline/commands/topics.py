@@ -92,7 +92,6 @@ def _save(arguments: argparse.Namespace, given: dict[str, Any]) -> int:
 
 
 def _parameter_text(node: str, parameters: list[dict[str, Any]]) -> str:
-    """A parameter file of a node."""
     import yaml
 
     lines = [f'# What changes live of {node}, {mark("topics")} param. Give it after your own file.', f'{node}:']

@@ -5,15 +5,14 @@ number is rounded to six digits before another number is computed from it: the s
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.parameters import from_mapping
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
@@ -24,18 +23,15 @@ from seal_friction_ros.core.friction.seal_file import parse_part, parse_seal
 from seal_friction_ros.core.identification import diagnostics, fitting, run_in, runs, seal_kinds, validation
 from seal_friction_ros.core.identification.breakaway import BreakawayFit, fit_breakaway
 from seal_friction_ros.core.identification.calibration import calibration
-from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, SealKind, candidate_laws, normal_forces
+from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, SealKind, candidate_laws
 from seal_friction_ros.core.identification.force_correction import ForceCorrection, force_correction
 from seal_friction_ros.core.identification.friction_model import Told
-from seal_friction_ros.core.identification.prepare_readings import with_predictable_groups
 from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
 from seal_friction_ros.core.identification.selection import (
     WORTHWHILE,
-    ChosenAnew,
     LawScore,
-    LeftOut,
     NotScored,
-    choose_anew,
+    Ticks,
     collinear_spread,
     recommended,
     rises_over_pressures,
@@ -60,7 +56,6 @@ from seal_friction_ros.offline.identification.results import (
 from seal_friction_ros.offline.identification.sources import SourceOptions, Sources, read_sources
 from seal_friction_ros.offline.identification.wording import kinds_warnings, remarks_on, warnings_of
 from seal_friction_ros.offline.work.executor import Workers
-from seal_friction_ros.offline.work.finished_parts import Part, content_of, part_key, run_parts
 from seal_friction_ros.offline.work.places import Place
 from seal_friction_ros.offline.work.progress import progress
 from seal_friction_ros.offline.work.seal_writer import rounded_numbers
@@ -88,24 +83,21 @@ class IdentifyOptions:
     name: str = ''  # of the seal; empty: the name of the seal file
 
 
-def identify(
-    paths: Sequence[Place], options: IdentifyOptions, name: str, workers: Workers = 1, work: Path | None = None
-) -> Identification:
+def identify(paths: Sequence[Place], options: IdentifyOptions, name: str, workers: Workers = 1) -> Identification:
     """Read bags, logs, tables or data sheets, fit every law, select one and assess it.
 
-    ValueError: the folder or the cluster cannot be used, the data are unfit for identification, or no law predicts
+    ValueError: the cluster cannot be used, the data are unfit for identification, or no law predicts
     them; one line with the reason and what to measure instead.
 
     Args:
         paths: The sources, by path or URL.
         options: How.
         name: Of the seal, unless the options name it.
-        workers: Sources, and groups that are left out, at a time, or a cluster; the result does not depend on it.
-        work: Folder that keeps what was found without each group, so that an interrupted run resumes; None keeps none.
+        workers: Sources at a time, or a cluster; the result does not depend on it.
     """
     data = gather(paths, options, workers)
     elastic = identify_presliding(data.sources) if options.presliding else None
-    selection = select_law(data, options.law, workers, work)
+    selection = select_law(data, options.law)
     _check_one_seal(diagnostics.swept_logs_compared(data.used, selection.fit), options.refuse_changed)
     told = _told_apart(data, selection, options.largest_kind_error)
     quality = assess(data, selection, options.run_to_run, told)
@@ -142,7 +134,7 @@ def gather(paths: Sequence[Place], options: IdentifyOptions, workers: Workers = 
     ring = _ring(sources, options)
     prepared = _prepared(sources, kinds)
     _check_one_seal(diagnostics.shared_levels(prepared.readings), options.refuse_changed)
-    correction = _correction(prepared, sources.has_fitted_load)
+    correction = _correction(prepared.readings, sources.has_fitted_load)
     if correction is not None and correction.is_significant:
         sources = sources.corrected(correction)
         prepared = _prepared(sources, kinds)
@@ -153,13 +145,12 @@ def gather(paths: Sequence[Place], options: IdentifyOptions, workers: Workers = 
             readings=at_reference(prepared.readings, warmth),
             breakaway=None if breakaway is None else at_reference(breakaway, warmth),
         )
-    readings = _with_normal_force(prepared.readings, ring)
-    outlier = None
+    readings, outlier = prepared.readings, None
     if not readings.are_samples and not kinds:
         laws = [law for law in _candidates(readings) if law.law_type is PressurePowerLaw and law.fixed]
         outlier = diagnostics.outlying_level(laws, readings)
     used = readings if outlier is None else readings.without(readings.level == outlier.level)
-    return IdentificationData(sources, prepared._replace(readings=readings), used, ring, outlier, correction, warmth)
+    return IdentificationData(sources, prepared, used, ring, outlier, correction, warmth)
 
 
 def _prepared(sources: Sources, kinds: tuple[SealKind, ...]) -> PreparedReadings:
@@ -178,17 +169,17 @@ def _prepared(sources: Sources, kinds: tuple[SealKind, ...]) -> PreparedReadings
             f'{where}: nothing but friction loads the rod, so the pressures are the effect of the friction and '
             'tell no kinds apart: load the rod and record the load, or drive with several supply or return pressures'
         )
-    readings = seal_kinds.kinds_readings(prepared.readings, prepared.chamber_pressures, kinds)
+    readings = seal_kinds.kinds_readings(prepared.readings, kinds)
     seal_kinds.check_kinds(readings)
     return prepared._replace(readings=readings)
 
 
-def _correction(prepared: PreparedReadings, has_fitted_load: bool) -> ForceCorrection | None:
-    if not prepared.readings.kinds:
-        return force_correction(prepared)
-    variation = variation_of(prepared.readings)
+def _correction(readings: FrictionReadings, has_fitted_load: bool) -> ForceCorrection | None:
+    if not readings.kinds:
+        return force_correction(readings)
+    variation = variation_of(readings)
     speeds, asymmetry = variation.speeds, variation.asymmetry and not has_fitted_load
-    return seal_kinds.area_errors(prepared.readings, Told(speeds, speeds, asymmetry, areas=True))
+    return seal_kinds.area_errors(readings, Told(speeds, speeds, asymmetry, areas=True))
 
 
 def _told_apart(data: IdentificationData, selection: LawSelection, largest_error: float) -> seal_kinds.ToldApart | None:
@@ -219,13 +210,6 @@ def _ring(sources: Sources, options: IdentifyOptions) -> Ring | None:
     return Ring(geometry, parse_part(NormalForceLaw, {'normal_force': normal_force}, 'seal'))
 
 
-def _with_normal_force(readings: FrictionReadings, ring: Ring | None) -> FrictionReadings:
-    if ring is None:
-        return readings
-    forces = normal_forces(readings.at.pressure, *ring)
-    return replace(readings, at=readings.at._replace(normal_force=forces))
-
-
 def _check_one_seal(changes: Sequence[diagnostics.RunChange], refuse_changed: bool) -> None:
     """Check that sources may be runs of one seal."""
     if not changes:
@@ -246,10 +230,8 @@ def _candidates(readings: FrictionReadings, ring: Ring | None = None) -> tuple[C
     return candidate_laws(variation_of(readings), *(ring or ()))
 
 
-def select_law(
-    data: IdentificationData, name: str | None, workers: Workers = 1, work: Path | None = None
-) -> LawSelection:
-    """Fit and score every candidate law; select the recommended one, or the one called ``name``; the rest as above.
+def select_law(data: IdentificationData, name: str | None) -> LawSelection:
+    """Fit and score every candidate law; select the recommended one, or the one called ``name``.
 
     ValueError: no law could be fitted, the selected one predicts nothing, or there is no law of that name.
     """
@@ -278,10 +260,6 @@ def select_law(
             f'{100.0 * selected.validation.error:.0f} % on left-out readings: measure more strokes at each pressure, '
             'in both directions, with a settled seal'
         )
-    anew = None
-    if name is None and not readings.are_samples:  # a swept log would take minutes
-        anew = _choose_anew(data, readings, workers, work)
-        anew = anew._replace(predicted=anew.predicted / share)
     fit, settled_law = selected.fit, None
     if settled is not None:
         fit, of_settled_seal = (fitting.fit(fit.law, each, fit.values) for each in (data.used, settled.readings))
@@ -295,38 +273,12 @@ def select_law(
         is_no_run_in=is_no_run_in,
         validation=run_in.as_measured(selected.validation, share),
         reference=validation.plain_mean(data.used),
-        chosen_anew=anew,
     )
 
 
-def _choose_anew(
-    data: IdentificationData, readings: FrictionReadings, workers: Workers, work: Path | None
-) -> ChosenAnew:
-    """Prediction of each group by a law chosen without it; the groups are parts of the work."""
-    ring, has_fitted_load = data.ring, data.sources.has_fitted_load
-    known = content_of([readings, ring, has_fitted_load])
-
-    def run(calls: Sequence[Callable[[], LeftOut]]) -> list[LeftOut]:
-        """Results of the calls, one for each group, kept in the work folder."""
-        parts = [
-            Part(part_key('choose without', [known, content_of(out)]), LeftOut._fields, call)
-            for out, call in zip(readings.groups, calls, strict=True)
-        ]
-        return [LeftOut(**found) for found in run_parts('choose without', parts, workers, work)]
-
-    return choose_anew(readings, partial(_recommended, ring=ring, has_fitted_load=has_fitted_load), run)
-
-
-def _recommended(readings: FrictionReadings, ring: Ring | None, has_fitted_load: bool) -> LawScore:
-    """Recommended law for the readings that are left."""
-    scores = _scored(with_predictable_groups(readings), ring, has_fitted_load)
-    return recommended(scores, rises=rises_over_pressures(readings))
-
-
 def _scored(
-    readings: FrictionReadings, ring: Ring | None, has_fitted_load: bool, tick: validation.Ticks = lambda _: None
+    readings: FrictionReadings, ring: Ring | None, has_fitted_load: bool, tick: Ticks = lambda _: None
 ) -> tuple[LawScore | NotScored, ...]:
-    """Scores of the ladder on some of the readings."""
     variation = variation_of(readings)
     if has_fitted_load:  # asymmetry is not identifiable: the fitted load holds it
         variation = variation._replace(asymmetry=False)
@@ -354,8 +306,7 @@ def assess(
         of_band = between.of_band
     unseen = collinear_spread(selection.scores, found, used) if told is None else told.unseen_std
     in_addition = math.hypot(of_band, unseen)
-    with progress('test the band', groups * (groups - 1)) as advance:
-        coverage = validation.band_coverage(selection.law, selection.readings, found.values, advance)
+    ratios = validation.deviations_of_left_out(selection.law, selection.readings, found.values)
     names = [parameter.name for parameter in selection.law.parameters]
     errors = validation.jackknife_errors(validation.table_of(left_out.values, names))
     return LawQuality(
@@ -365,7 +316,7 @@ def assess(
         changes=diagnostics.shared_levels(everything) + diagnostics.swept_logs_compared(used, found),
         told_apart=unseen,
         kinds=told,
-        coverage=coverage,
+        coverage=float(np.mean(ratios <= BAND_95)),
         calibration=calibration(selection.law, selection.readings, found.values, run_to_run),
         repeatability=diagnostics.repeatability(used, found.offsets),
         drifts=[] if used.are_samples else run_in.drifts(everything, offsets),
@@ -375,12 +326,10 @@ def assess(
 
 
 def _breakaway(data: IdentificationData, found: fitting.LawFit) -> BreakawayFit | None:
-    if data.prepared.breakaway is None:
-        return None
-    readings = _with_normal_force(data.prepared.breakaway, data.ring)
-    if data.outlier is not None:
+    readings = data.prepared.breakaway
+    if readings is not None and data.outlier is not None:
         readings = readings.taken(readings.level != data.outlier.level)
-    if len(readings.groups) < 2:
+    if readings is None or len(readings.groups) < 2:
         return None
     return fit_breakaway(readings, found.law.coulomb_friction(readings.at, found.values), found.offsets)
 
@@ -390,16 +339,12 @@ def _levels(
 ) -> tuple[PressureLevel, ...]:
     """Measured and fitted friction at each pressure level, by the ``mounted`` seals."""
     readings = data.prepared.readings
-    fitted, std = fitted_readings(mounted, data.prepared.chamber_pressures, readings.at.velocity)
+    fitted, std = fitted_readings(mounted, readings.chamber_pressures, readings.at.velocity)
     measured = readings.magnitudes(fitting.offsets_of(readings, fitted))
     is_mean = readings.are_samples or bool(readings.kinds)  # a condition of several kinds holds several speeds
-    unseen = np.full((data.used.count, 2), np.nan)
-    unseen[:, 0] = selection.validation.predicted
-    if selection.chosen_anew is not None:
-        unseen[:, 1] = selection.chosen_anew.predicted
-    predicted = data.used.level_means(unseen).tolist()
+    predicted = data.used.level_means(selection.validation.predicted).tolist()
     if data.outlier is not None:
-        predicted.insert(list(readings.levels).index(data.outlier.level), [data.outlier.expected] * 2)
+        predicted.insert(list(readings.levels).index(data.outlier.level), data.outlier.expected)
     return tuple(
         PressureLevel(
             pressure=float(readings.seal_pressure[inside].mean()),
@@ -408,13 +353,12 @@ def _levels(
             fitted=float(fitted[inside].mean()),
             std=float(std[inside].mean()),
             left_out=left_out,
-            left_out_nested=nested,
             offset=math.nan if readings.are_samples else readings.half_range(inside).offset,
             readings=int(inside.sum()),
             drift=float(np.mean([d.change for d in quality.drifts if d.level == level] or [math.nan])),
             is_used=not data.is_outlier(level),
         )
-        for (level, inside), (left_out, nested) in zip(readings.levels.items(), predicted, strict=True)
+        for (level, inside), left_out in zip(readings.levels.items(), predicted, strict=True)
     )
 
 

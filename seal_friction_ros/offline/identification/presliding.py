@@ -68,7 +68,7 @@ def presliding_numbers(found: IdentifiedPresliding) -> dict[str, Any]:
     return {
         'stiffness_N_per_m': fit.presliding.stiffness,
         'standard_errors': {
-            'stiffness_N_per_m': fit.relative_stiffness_std * fit.presliding.stiffness,
+            'stiffness_N_per_m': fit.presliding.relative_std * fit.presliding.stiffness,
             'yield_exponent': fit.yield_exponent_std,
             'memory_length_m': fit.relative_memory_length_std * fit.presliding.memory_length,
             'dwell_time_s': fit.relative_dwell_time_std * fit.presliding.dwell_time,
@@ -94,7 +94,7 @@ def presliding_text(found: IdentifiedPresliding) -> str:
     lag = f', memory length {made.memory_length / UM:.3g} um' if fit.excess else ''
     lag += f', dwell time {made.dwell_time:.3g} s' if made.dwell_time else ''
     return (
-        f'presliding: {made.stiffness:.3g} N/m +-{100.0 * fit.relative_stiffness_std:.2g} %, exponent '
+        f'presliding: {made.stiffness:.3g} N/m +-{100.0 * fit.presliding.relative_std:.2g} %, exponent '
         f'{made.yield_exponent:.2g} +-{fit.yield_exponent_std:.2g}, all sliding after '
         f'{fit.full_yield / MM:.2g} mm{lag}; {score.reversals} of {fit.reversals} reversals kept back: '
         f'RMS {score.elastic:.3g} N, rigid seals {score.rigid:.3g} N, their repeatability {score.repeatability:.3g} N'

@@ -18,11 +18,12 @@ from seal_friction_ros.core.identification.calibration import Calibration
 from seal_friction_ros.core.identification.candidate_laws import DIVIDED, CandidateLaw, SealKind, columns_of
 from seal_friction_ros.core.identification.diagnostics import Outlier, RunChange
 from seal_friction_ros.core.identification.force_correction import NOTICED, ForceCorrection
+from seal_friction_ros.core.identification.load_over_position import LoadOverPosition, load_at
 from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
 from seal_friction_ros.core.identification.run_in import Drift, SettledLaw
 from seal_friction_ros.core.identification.runs import BetweenRuns
 from seal_friction_ros.core.identification.seal_kinds import ToldApart, proposed_conditions
-from seal_friction_ros.core.identification.selection import ChosenAnew, LawScore, NotScored, is_beaten, scored
+from seal_friction_ros.core.identification.selection import LawScore, NotScored, is_beaten, scored
 from seal_friction_ros.core.identification.signal_preparation import LEVEL_GAP, LEVEL_GAP_MIN
 from seal_friction_ros.core.identification.temperature import TemperatureFit
 from seal_friction_ros.core.identification.validation import (
@@ -31,7 +32,6 @@ from seal_friction_ros.core.identification.validation import (
     jackknife_covariance,
     table_of,
 )
-from seal_friction_ros.offline.identification.load_numbers import load_numbers
 from seal_friction_ros.offline.identification.presliding import (
     IdentifiedPresliding,
     presliding_numbers,
@@ -39,6 +39,8 @@ from seal_friction_ros.offline.identification.presliding import (
 )
 from seal_friction_ros.offline.identification.sources import Sources
 from seal_friction_ros.offline.work.seal_writer import rounded_numbers
+
+LOAD_POINTS = 21  # equally spaced positions at which the load is given (our choice)
 
 
 class Ring(NamedTuple):
@@ -83,8 +85,6 @@ class LawSelection:
     validation: CrossValidation  # of the readings as measured
     reference: CrossValidation | None
     """prediction by the mean of the other readings at the same pressure, without a law"""
-    chosen_anew: ChosenAnew | None
-    """prediction by laws chosen without each group; None for swept logs and for a law that the user names"""
 
     @property
     def law(self) -> CandidateLaw:
@@ -133,7 +133,6 @@ class PressureLevel(NamedTuple):
     fitted: float  # [N] all seals, by the law fitted to the readings as measured
     std: float  # [N] of a new reading, by that law
     left_out: float  # [N] prediction by the law fitted without these readings; they had a say in its choice
-    left_out_nested: float  # [N] prediction by a law chosen and fitted without these readings; NaN if not done
     offset: float  # [N] of the force sum
     readings: int
     drift: float  # [-] relative change of the friction over the run; NaN if unknown
@@ -312,9 +311,33 @@ def identification_section(
             'warnings': warnings,
         }
     )
-    load = load_numbers([(source.file.name, source.load) for source in data.sources.each])
-    section |= {} if load is None else {'load': load}
+    loads = [_load_numbers(source.file.name, source.load) for source in data.sources.each if source.load is not None]
+    section |= {'load': loads[0] | ({'others': loads[1:]} if loads[1:] else {})} if loads else {}
     return section if presliding is None else section | {'presliding': _without_nan(presliding_numbers(presliding))}
+
+
+def _load_numbers(name: str, load: LoadOverPosition) -> dict[str, Any]:
+    position = np.linspace(load.knots[0], load.knots[-1], LOAD_POINTS)
+    position[-1] = load.knots[-1]
+    numbers: dict[str, Any] = rounded_numbers(
+        {
+            'source': name,
+            'position_m': position,
+            'force_N': load_at(load, position),
+            'std_N': np.interp(position, load.knots, load.std),
+            'mass_kg': load.mass,
+            'mass_std_kg': load.mass_std,
+            'mass_change_kg_per_m': load.mass_change,
+            'noise_N': load.noise,
+            'strokes': load.strokes,
+            'condition_number': load.condition_number,
+            'friction_N': load.friction.mean,
+            'friction_standard_error_N': load.friction.standard_error,
+            'friction_terms': dict(zip(load.friction.names, load.friction.values.tolist(), strict=True)),
+            'warnings': load.warnings,
+        }
+    )
+    return numbers
 
 
 def kind_section(data: IdentificationData, quality: LawQuality, number: int) -> dict[str, Any]:
@@ -353,7 +376,6 @@ def kinds_numbers(found: Identification) -> dict[str, Any]:
 
 
 def _kind_numbers(found: Identification, fit: fitting.LawFit, told: ToldApart, number: int) -> dict[str, Any]:
-    """Numbers of the kind of index ``number``."""
     readings, total = found.data.used, float(told.friction.sum())
     kind = readings.kinds[number]
     of_one = fit.law.of_one_seal(fit.values)[number]
@@ -384,8 +406,6 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
             'std_N': [level.std for level in levels],
             'left_out_N': [level.left_out for level in levels],
             'worst_left_out_error': worst_left_out(levels),
-            'left_out_nested_N': [level.left_out_nested for level in levels],
-            'left_out_nested_laws': selection.chosen_anew and selection.chosen_anew.laws,
             'cross_validation_mean_deviation_N': selection.validation.mean_deviation,
             'ladder': [_ladder_row(score, selection) for score in selection.scores],
             'plain_mean_deviation_N': reference and reference.mean_deviation,
@@ -436,7 +456,6 @@ def _correction_numbers(correction: ForceCorrection | None) -> dict[str, Any]:
 
 
 def _run_in_numbers(data: IdentificationData, drifts: Sequence[Drift]) -> list[dict[str, Any]]:
-    """Drift of the friction over each run."""
     return [
         {
             'source': data.sources.files[drift.source].name,

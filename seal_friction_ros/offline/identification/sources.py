@@ -27,7 +27,6 @@ from seal_friction_ros.offline.bags.import_log import read_samples
 from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 from seal_friction_ros.offline.bags.rig_file import Rig, read_rig
 from seal_friction_ros.offline.identification.data_sheet import TITLE, parse_number, read_data_sheet, read_text
-from seal_friction_ros.offline.identification.load_numbers import load_text
 from seal_friction_ros.offline.work.executor import Workers, run_all
 from seal_friction_ros.offline.work.places import Place, as_path
 
@@ -199,7 +198,12 @@ def without_load_of(source: Source, chambers: Sequence[str], options: SourceOpti
     except ValueError as error:
         raise ValueError(f'{name}: {error}') from None
     cleaned = load_over_position.without_load(signals, source.load_position, load, sliding)
-    texts = tuple(f'{name}: {text}' for text in (load_text(load), *load.warnings))
+    told = (
+        f'a load of {float(load.forces.min()):.4g} to {float(load.forces.max()):.4g} N over {load.knots[0]:.4g} to '
+        f'{load.knots[-1]:.4g} m (standard deviation {float(load.std.mean()):.2g} N) and the inertia of '
+        f'{load.mass:.4g} kg were fitted and taken out of the force sum; samples at other positions are not used'
+    )
+    texts = tuple(f'{name}: {text}' for text in (told, *load.warnings))
     dropped = {**dropped, admission.BEYOND_LOAD: len(signals.time) - len(cleaned.time)}
     if options.largest_acceleration is None:
         known = max(sliding.largest_acceleration, load_over_position.known_acceleration(load))
@@ -237,7 +241,7 @@ def _read_log(path: Path, options: SourceOptions) -> Source:
             check_clipping(path.name, where, column[moving] * UNITS[term.unit], is_pressure=is_pressure)
     seconds = (samples.stamp - samples.stamp[0]) * 1e-9
     signals = Signals(seconds, samples.velocity, samples.chamber_a, samples.chamber_b, samples.force_sum)
-    recorded = RecordedLog(path.name, signals, sliding, log.temperature, log.position, dict(log.dropped))
+    recorded = RecordedLog(path.name, signals, sliding, log.track.temperature, log.position, dict(log.dropped))
     recorded, texts = _admitted(recorded)
     remarks = (*remarks, *texts, *(f'{path.name}: {text}' for text in log.remarks))
     source = Source(_data_file(path), None, recorded, pressure_area=_pressure_area(rig), remarks=remarks)

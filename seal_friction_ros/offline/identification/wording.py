@@ -131,7 +131,7 @@ def _outlier_text(outlier: diagnostics.Outlier, levels: Sequence[PressureLevel])
 
 
 def _collinearity_texts(data: IdentificationData, selection: LawSelection) -> Iterator[str]:
-    for pair in diagnostics.collinear_regressors(data.prepared.readings, data.prepared.chamber_pressures):
+    for pair in diagnostics.collinear_regressors(data.prepared.readings):
         yield (
             f'{pair.one} and {pair.other} are collinear: they changed together (correlation {pair.correlation:+.2f}), '
             'so their effects can hardly be separated: drive several speeds at each pressure'

@@ -372,7 +372,6 @@ def _silent(held: Held, now: int) -> dict[str, float | None]:
 
 
 def _faults(status: int) -> list[str]:
-    """What the bits of a status mean."""
     usual = ' (usual at a reversal)'
     return [words + (usual if USUAL & bit else '') for bit, words in STATUS_WORDS.items() if status & bit]
 

@@ -16,7 +16,7 @@ from seal_friction_ros.core.estimation.adaptation import AdaptationState
 from seal_friction_ros.core.estimation.adaptation import learnt as learnt_of
 from seal_friction_ros.core.estimation.compiled_pipeline import Answers
 from seal_friction_ros.core.estimation.configuration import Configuration, Snapshot
-from seal_friction_ros.core.estimation.findings import GOOD, USUAL_LIMITS, Limits
+from seal_friction_ros.core.estimation.findings import GOOD
 from seal_friction_ros.core.estimation.friction_filter import PROVEN
 from seal_friction_ros.core.estimation.seal_health import START, Starts, with_sample
 from seal_friction_ros.core.foundation.arrays import FloatArray
@@ -121,20 +121,12 @@ def _account(estimates: Any) -> Account:
 
 
 def health_of_bags(
-    bags: Sequence[Place],
-    namespace: str = '',
-    override: Configuration | None = None,
-    workers: Workers = 1,
-    kept: Kept = NOWHERE,
-    mapping: MappingFile | None = None,
-    limits: Limits = USUAL_LIMITS,
+    bags: Sequence[Place], chosen: Chosen, workers: Workers = 1, kept: Kept = NOWHERE
 ) -> list[Outcome[BagHealth]]:
-    """`bag_health` of bags with their verdicts, ``workers`` of them at a time; outcomes in the order of the bags.
+    """`bag_health` of each bag with its verdict, in their order; arguments and errors as of `try_bags`.
 
     The estimator is compiled once before the worker processes begin; a cluster compiles once for each of its workers.
-    ValueError: the work folder or the cluster cannot be used.
     """
-    chosen = Chosen(namespace, mapping, override, limits)
     return try_bags('health', bags, BagHealth, _health, chosen, workers, kept, partial(compile_first, bags, chosen))
 
 

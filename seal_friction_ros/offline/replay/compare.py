@@ -32,8 +32,6 @@ _Decoded = tuple[bytes, dict[str, Any]]  # bytes and fields of a message
 
 
 class _Topic(NamedTuple):
-    """A topic of a bag."""
-
     bag: Path
     name: str
     read: Callable[[], Iterator[BagMessage]]
@@ -107,16 +105,10 @@ def compare(
     numbers agree if ``|b - a| <= atol + rtol |a|`` or if both are NaN, other values if they are equal. BagError: a bag
     cannot be read or has no such topic, a message on it is of an unknown type, or no stamp is in both bags.
 
-    Args:
-        bag_a: First bag, the reference.
-        bag_b: Second bag.
-        topic: Topic; by default that of the friction estimates, which may have another name in each bag.
-        atol: Absolute tolerance, in the unit of each field.
-        rtol: Relative tolerance [-].
-        tolerances: Field that decides -> its absolute tolerance, None: ``atol``. By default `FRICTION_FIELDS` decide
-            on estimates, and all fields on other messages.
-        namespace: As of `open_actuator`.
-        mapping: Likewise; then the estimates are made here.
+    The topic is by default that of the friction estimates, which may have another name in each bag. ``tolerances``:
+    field that decides -> its absolute tolerance, None: ``atol``; by default `FRICTION_FIELDS` decide on estimates, and
+    all fields on other messages. ``namespace`` and ``mapping`` as of `open_actuator`; with a mapping the estimates are
+    made here.
     """
     a, b = (_topic_of(bag, topic, namespace, mapping) for bag in (bag_a, bag_b))
     stamps_a, stamps_b = _stamps(a), _stamps(b)

@@ -33,7 +33,6 @@ def write_fleet_table(bags: Sequence[FleetBag], out: Path) -> None:
 
 
 def _rows(bag: FleetBag) -> Iterator[dict[str, Any]]:
-    """A row for each pressure level of a bag."""
     of_bag: dict[str, Any] = {'bag': str(bag.path), 'level': bag.level, 'why': bag.why}
     of_bag |= {name: getattr(bag.summary, name, None) for name in _OF_BAG}
     levels = bag.summary.levels.tolist() if bag.summary is not None else []

@@ -96,18 +96,15 @@ def _verdict(
 
 
 def _dates(days: Sequence[Day]) -> tuple[str, ...]:
-    """Dates of the data, first to last."""
     known = [date_text(day.time)[:10] for day in days if day.time > FIRST_DATE]
     return (f'data of {" to ".join(dict.fromkeys((known[0], known[-1])))}',) if known else ('data without a date',)
 
 
 def _text(one: Value) -> str:
-    """Value and standard deviation as text."""
     return 'not told' if not math.isfinite(one.value) else f'{one.value:.4g} ± {one.std:.2g}'
 
 
 def _figure(seen: Sequence[BagHealth], changes: Sequence[dict[str, float]]) -> Plot:
-    """Scale over the reversals, bag after bag."""
     figure, axes = style.new_figure('Friction over that of the seal file, reversal by reversal', 3.6)
     first = 0
     for number, one in enumerate(seen):

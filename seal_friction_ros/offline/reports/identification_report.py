@@ -83,9 +83,11 @@ def _verdict(found: Identification, files: Sequence[str]) -> Verdict:
         shares = [(kind.name, friction / total, std / total) for kind, friction, std in parts]
         return _verdict_on_kinds(selection.validation.error, shares, files)
     remarks = {
-        'outlier': found.data.outlier is not None,
-        'changed': any(change.is_changed for change in quality.changes),
-        'drifted': any(level.is_used and abs(level.drift) > diagnostics.SETTLED for level in found.levels),
+        'one pressure is an outlier and was left out': found.data.outlier is not None,
+        'friction differs between the runs': any(change.is_changed for change in quality.changes),
+        'friction drifted during the runs': any(
+            level.is_used and abs(level.drift) > diagnostics.SETTLED for level in found.levels
+        ),
     }
     numbers = selection.validation.error, worst_left_out(found.levels), quality.coverage, selection.fit.why_unsound
     return verdicts.of_identification(selection.law.name, *numbers, *filter(remarks.get, remarks))
@@ -203,7 +205,7 @@ class _FittedReadings:
         self.pressure = self.readings.seal_pressure / BAR
         self.mounted = mounted_seals(found.as_measured)
         self.seal = self.mounted[0].seal
-        self.fitted, _ = fitted_readings(self.mounted, found.data.prepared.chamber_pressures, self.readings.at.velocity)
+        self.fitted, _ = fitted_readings(self.mounted, self.readings.chamber_pressures, self.readings.at.velocity)
         self.measured = self.readings.magnitudes(offsets_of(self.readings, self.fitted))
         self.unit, self.size = force_unit(float(self.measured.max()))
         self.is_used = self.readings.level != (-1 if found.data.outlier is None else found.data.outlier.level)

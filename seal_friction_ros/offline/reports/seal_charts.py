@@ -265,7 +265,6 @@ def seal_model_figure(shown: ChartedSeal) -> Plot:
 
 
 def _draw_readings(ax: Axes, size: float) -> None:
-    """Readings of the thesis and their means over pressure, in units of ``size`` [N]."""
     pressure, friction = dynamic_readings()
     faint = {**_SINGLE, 'ms': 4.0, 'alpha': 0.3, 'mew': 0.0}
     ax.plot(pressure / BAR, friction / size, **faint, label='readings, running')

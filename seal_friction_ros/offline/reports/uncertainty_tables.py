@@ -25,7 +25,6 @@ def uncertainty_values(uncertainty: Uncertainty | None, unknowns: Sequence[Unkno
 
 
 def _quantile_table(uncertainty: Uncertainty) -> Table:
-    """Row for each pressure and speed."""
     heads = [
         'pressure [bar]',
         *(['speed [mm/s]'] if uncertainty.speeds else []),
@@ -44,7 +43,6 @@ def _quantile_table(uncertainty: Uncertainty) -> Table:
 
 
 def _unknown_table(uncertainty: Uncertainty, unknowns: Sequence[Unknown]) -> Table:
-    """Row for each unknown."""
     correlations, by_name = uncertainty.rank_correlations, {unknown.name: unknown for unknown in unknowns}
     columns: Columns = (
         ('unknown', lambda one: one.name),

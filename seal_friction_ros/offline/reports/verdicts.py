@@ -13,19 +13,11 @@ SMALL_NUMERICS, LARGE_NUMERICS = 0.05, 0.15  # [-] change of friction with a coa
 WIDE_BAND = 0.15  # [-] standard deviation of a seal file: LOOK above
 
 
-REMARKS = {
-    'outlier': 'one pressure is an outlier and was left out',
-    'changed': 'friction differs between the runs',
-    'drifted': 'friction drifted during the runs',
-}
-"""What makes an identification one to look at."""
-
-
 def of_identification(law: str, error: float, largest: float, coverage: float, unsound: str, *remarks: str) -> Verdict:
     """Verdict on an identified law, by readings left out of its fit.
 
     Their mean ``error`` [-], the ``largest`` of the mean at a pressure [-], their share in the 95 % band [-]; why the
-    parameters are not determined, empty if they are; some of `REMARKS`.
+    parameters are not determined, empty if they are; what makes it one to look at.
     """
     told = LOOK if remarks else GOOD
     level = worst([between(error, SMALL_ERROR, LARGE_ERROR), in_band(coverage), BAD if unsound else GOOD, told])
@@ -34,11 +26,10 @@ def of_identification(law: str, error: float, largest: float, coverage: float, u
         f'at a pressure by {percent(largest)} at most; {percent(coverage)} lie in the 95 % band'
     )
     reasons = [f'the parameters are not determined ({unsound})'] if unsound else []
-    reasons += [REMARKS[name] for name in remarks]
     after = 'replay a bag with the seal file and compare: seal_friction replay BAG --seal SEAL.yaml --out NEW.'
     if level != GOOD:
         after = 'read the remarks below, then measure what --next proposes: seal_friction identify ... --next next.csv.'
-    return Verdict(level, '; '.join([text, *reasons]) + '.', after)
+    return Verdict(level, '; '.join([text, *reasons, *remarks]) + '.', after)
 
 
 def of_tuning(summary: str, *, is_better: bool, has_placeholder: bool, mass: float | None, fitted: bool) -> Verdict:

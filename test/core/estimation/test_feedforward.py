@@ -26,11 +26,11 @@ from seal_friction_ros.core.friction.presliding import (
     NO_ELEMENTS,
     Elements,
     Presliding,
-    initial_loading,
     presliding_numbers,
 )
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.messages.records import NEVER, FrictionEstimate, Limited, Status
+from test.harness.masing import initial_loading
 
 MS = 1_000_000  # [ns]
 NONE = -1.0  # no usable friction

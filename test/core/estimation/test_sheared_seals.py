@@ -48,7 +48,6 @@ from seal_friction_ros.core.friction.presliding import (
     Shear,
     Slide,
     element_forces,
-    initial_loading,
     presliding_numbers,
     shear,
 )
@@ -56,6 +55,7 @@ from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.messages.records import NEVER, Force, FrictionEstimate, Pressure, Status
 from seal_friction_ros.files import load_configuration, read_yaml
+from test.harness.masing import initial_loading
 
 START, MS = 10**12, 10**6  # [ns]
 PRESSURE = 2e6  # [Pa]

@@ -299,14 +299,6 @@ def test_meanings_come_in_order_of_declaration_of_class_and_instance_alike():
     assert meanings(Spring)['stiffness'] == Meaning('N/m', 'Force per length.', 1.0, 1e6, live=True)
 
 
-@pytest.mark.parametrize(
-    ('lower', 'upper', 'text'),
-    [(None, None, ''), (0.0, 1.0, '0.0 to 1.0'), (0.5, None, '0.5 to None'), (None, 0.5, 'None to 0.5')],
-)
-def test_bounds_have_a_text(lower, upper, text):
-    assert Meaning('', '', lower, upper).bounds_text() == text
-
-
 @pytest.mark.parametrize('record', RECORDS, ids=lambda record: record.__name__)
 def test_every_parameter_has_a_description_and_ordered_bounds(record):
     assert meanings(record)

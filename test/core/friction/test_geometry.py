@@ -120,7 +120,7 @@ def test_rubber_has_5_5_megapascal_unless_told():
         ({'section_diameter': 1.79e-3}, r'section_diameter = 0.00179 m gives a squeeze of -0.006; bounds 0 to 0.5'),
         ({'section_diameter': 1.7e-3}, r'section_diameter = 0.0017 m gives a squeeze of -0.059'),
         ({'section_diameter': 4e-3}, r'section_diameter = 0.004 m gives a squeeze of 0.550'),
-        ({'sliding_wall': 'shaft'}, r"sliding_wall = 'shaft' is neither rod nor bore"),
+        ({'sliding_wall': 'shaft'}, r"sliding_wall = 'shaft' is none of rod, bore"),
         ({'rod_diameter': -1.0}, r'rod_diameter = -1.0 m is below its lower bound 0.0001 m'),
         ({'elastic_modulus': 1e12}, r'elastic_modulus = 1000000000000.0 Pa is above its upper bound 10000000000.0 Pa'),
         ({'ring_inner_diameter': math.nan}, r'ring_inner_diameter = nan m is not finite'),

@@ -19,18 +19,26 @@ from seal_friction_ros.core.friction.presliding import (
     Elements,
     LuGreNumbers,
     Presliding,
+    PreslidingNumbers,
     Shear,
     Slide,
-    acting_friction,
     element_forces,
-    initial_loading,
     lugre,
     presliding_numbers,
     presliding_of_map,
     shear,
     stored_energy,
 )
-from seal_friction_ros.core.friction.states import FrictionState, state_friction
+from seal_friction_ros.core.friction.states import (
+    BREAKAWAY,
+    SLIDING,
+    STUCK,
+    FrictionState,
+    StateFriction,
+    sign,
+    state_friction,
+)
+from test.harness.masing import initial_loading
 
 FRICTION = 20.0  # [N]
 SEAL = Presliding(stiffness=1e5, yield_exponent=1.5)
@@ -56,6 +64,29 @@ def friction_over(numbers, positions, friction=FRICTION):
 def yield_displacement(numbers, friction=FRICTION):
     """Displacement at which the last element yields [m]."""
     return numbers.shares.last * friction / numbers.stiffnesses.last
+
+
+def acting_friction(
+    numbers: PreslidingNumbers,
+    state: Shear,
+    force: float,
+    slide: Slide,
+    at_rest: bool,
+    velocity: float,
+    force_sum: float,
+) -> StateFriction:
+    """Friction that acts on the rod and its state, after `shear` made ``state`` and ``force`` [N] of ``slide``.
+
+    Sliding or breakaway where every element yields, stuck below. Rigid seals have the six states of `state_friction`,
+    with its arguments.
+    """
+    if math.isinf(numbers.stiffness):
+        coulomb = slide.coulomb_friction
+        return state_friction(velocity, force_sum, at_rest, coulomb + slide.sliding_excess, coulomb + slide.stiction)
+    direction = sign(force)
+    if abs(force) < slide.coulomb_friction + state.excess:
+        return StateFriction(STUCK, direction, force)
+    return StateFriction(BREAKAWAY if at_rest else SLIDING, direction, force)
 
 
 class TestLimits:

@@ -27,7 +27,7 @@ def starts(stiction, dwell=None, scatter=0.02, seed=0, tests=3):
     rest = rest if dwell is None else dwell(bar, rest)
     force = (coulomb(bar) + stiction(coulomb(bar), rest)) * (1.0 + scatter * rng.normal(size=len(bar)))
     level = np.searchsorted(BARS, bar)
-    at = OperatingConditions(1e5 * np.column_stack((bar, bar)), None, 0.0 * direction, direction)
+    at = OperatingConditions(1e5 * np.column_stack((bar, bar)), 0.0 * direction, direction)
     readings = FrictionReadings(
         at, direction * force, np.zeros(len(bar), dtype=int), level, level, ('made',), 'pressure', False, dwell=rest
     )

@@ -33,7 +33,7 @@ def strokes(runs=6, scatter=0.05, run_scatter=0.0, seed=0, pressures=5, count=8,
     run = np.repeat(np.arange(runs), pressures * count)
     source = run * pressures + level if one_pressure else run
     direction = np.tile([1.0, -1.0], len(run) // 2)
-    at = OperatingConditions((1e5 + 1e6 * level)[:, np.newaxis], None, 0.01 * direction, direction)
+    at = OperatingConditions((1e5 + 1e6 * level)[:, np.newaxis], 0.01 * direction, direction)
     effect = run_scatter * rng.normal(size=int(source.max()) + 1)[source]
     shares = 1.0 + scatter * rng.normal(size=len(run)) + effect
     return FrictionReadings(

@@ -1,6 +1,7 @@
 """Candidate laws: what is fitted is what the node runs, and each law has the limits that its physics has."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from operator import attrgetter
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGai
 from seal_friction_ros.core.friction.seal_file import law_document, parse_seal
 from seal_friction_ros.core.identification.candidate_laws import (
     COMPILED_FROM,
+    FittedParameter,
     OperatingConditions,
     Variation,
     candidate_laws,
@@ -46,15 +48,13 @@ def conditions(rows=50) -> OperatingConditions:
     rng = np.random.default_rng(4)
     pressure = rng.uniform(0.0, 5e6, (rows, 2))
     velocity = rng.uniform(-0.2, 0.2, rows)
-    return OperatingConditions(
-        pressure, normal_forces(pressure, THESIS_RING, NORMAL_FORCE_LAW), velocity, np.sign(velocity)
-    )
+    return OperatingConditions(pressure, velocity, np.sign(velocity))
 
 
 def values_of(law):
     """Parameters of a law: those of `VALUES`, else the first guess."""
-    typical = conditions().typical(12.0)
-    return {p.name: VALUES.get(p.name, p.start(typical)) for p in law.parameters} | law.fixed
+    guess = law.first_guess(conditions(), 12.0)
+    return {name: VALUES.get(name, value) for name, value in guess.items()} | law.fixed
 
 
 def seal_of(law):
@@ -137,13 +137,13 @@ def test_asymmetry_is_tried_only_where_it_is_no_offset():
 
 def test_at_no_pressure_and_at_one_bar_the_power_law_is_what_its_parameters_say():
     (law,) = (r for r in ALL if r.name == 'pressure_power_law')
-    at = OperatingConditions(np.array([[0.0], [1e5]]), None, np.zeros(2), np.ones(2))
+    at = OperatingConditions(np.array([[0.0], [1e5]]), np.zeros(2), np.ones(2))
     assert law.friction(at, VALUES) == pytest.approx([5.0, 5.8])
 
 
 def test_stribeck_friction_has_faded_to_37_percent_at_its_velocity():
     (law,) = (r for r in ALL if r.name == 'coulomb_stribeck')
-    at = OperatingConditions(np.zeros((2, 1)), None, np.array([0.0, -0.02]), np.array([1.0, -1.0]))
+    at = OperatingConditions(np.zeros((2, 1)), np.array([0.0, -0.02]), np.array([1.0, -1.0]))
     viscous = np.array([0.0, 0.02 * 150.0])
     assert law.friction(at, VALUES) - 12.0 - viscous == pytest.approx([4.0, 4.0 * np.exp(-1.0)])
 
@@ -165,24 +165,22 @@ def test_squeeze_force_rises_with_squeeze():
     assert squeeze_force(tight) > 1.5 * squeeze_force(THESIS_RING)
 
 
-def test_typical_magnitudes_are_the_highest_pressure_and_speed_and_the_mean_normal_force():
+def test_a_first_guess_takes_the_highest_pressure_and_speed_and_the_mean_normal_force():
     at = OperatingConditions(
-        np.array([[1e5, 3e5], [5e5, 2e5], [0.0, 0.0]]),
-        None,
-        np.array([0.02, -0.05, np.nan]),
-        np.array([1.0, -1.0, 1.0]),
+        np.array([[1e5, 3e5], [5e5, 2e5], [0.0, 0.0]]), np.array([0.02, -0.05, np.nan]), np.array([1.0, -1.0, 1.0])
     )
-    found = at.typical(7.0)
-    assert found[:3] == (7.0, 5e5, 0.05)
-    assert np.isnan(found[3])
-    loaded = at._replace(normal_force=np.array([[10.0, 30.0], [50.0, 20.0], [4.0, 6.0]]))
-    assert loaded.typical(7.0)[3] == 20.0
-    assert at._replace(velocity=np.full(3, np.nan)).typical(7.0)[2] == 0.0
-    taken = loaded.taken(np.array([2, 0]))
+    names = ('friction', 'pressure', 'speed', 'normal_force')
+    shown = tuple(FittedParameter(name, '', 0.0, 1.0, attrgetter(name), '') for name in names)
+    (constant, *_) = candidate_laws(Variation())
+    rigid = replace(constant, parameters=shown)
+    assert list(rigid.first_guess(at, 7.0).values()) == pytest.approx([7.0, 5e5, 0.05, np.nan], nan_ok=True)
+    assert rigid.first_guess(at._replace(velocity=np.full(3, np.nan)), 7.0)['speed'] == 0.0
+    ring = {'geometry': THESIS_RING, 'normal_force_law': NORMAL_FORCE_LAW}
+    loaded = replace(rigid, parts=ring).first_guess(at, 7.0)['normal_force']
+    assert loaded == pytest.approx(normal_forces(at.pressure, **ring).mean())
+    taken = at.taken(np.array([2, 0]))
     assert taken.pressure.tolist() == [[0.0, 0.0], [1e5, 3e5]]
-    assert taken.normal_force.tolist() == [[4.0, 6.0], [10.0, 30.0]]
     assert taken.direction.tolist() == [1.0, 1.0]
-    assert at.taken(np.array([1])).normal_force is None
 
 
 def test_a_fit_has_the_bounds_of_physics():
@@ -197,7 +195,7 @@ def test_a_fit_has_the_bounds_of_physics():
 
 def test_an_unknown_speed_counts_as_none():
     law = next(law for law in ALL if law.name == 'coulomb_viscous')
-    at = OperatingConditions(np.zeros((2, 2)), None, np.array([np.nan, -0.1]), np.array([1.0, -1.0]))
+    at = OperatingConditions(np.zeros((2, 2)), np.array([np.nan, -0.1]), np.array([1.0, -1.0]))
     assert law.friction(at, VALUES) == pytest.approx([24.0, 24.0 + 2.0 * 15.0])
     assert law.coulomb_friction(at, VALUES) == pytest.approx([24.0, 24.0])
     assert law.velocity_terms == ('viscous_friction',)

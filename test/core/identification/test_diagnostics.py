@@ -29,7 +29,7 @@ def made(bars, frictions, velocity=0.02, source=0, samples=False, names=('log',)
     pressure = np.repeat(np.asarray(bars, float), 2)[:, np.newaxis] * BAR
     speed = np.repeat(np.broadcast_to(velocity, n), 2)
     level = np.unique(pressure, return_inverse=True)[1].reshape(-1)
-    at = OperatingConditions(pressure, None, direction * speed, direction)
+    at = OperatingConditions(pressure, direction * speed, direction)
     of = np.repeat(np.broadcast_to(source, n), 2)
     force = direction * np.repeat(np.asarray(frictions, float), 2)
     return FrictionReadings(at, force, of, level, level, names, 'pressure', samples)
@@ -53,26 +53,26 @@ def pair(correlation):
 def test_speed_and_pressure_go_together_from_nine_tenths_on(correlation, told):
     x, y = pair(correlation)
     readings = made(50.0 + 10.0 * y, np.full(8, 20.0), 0.05 + 0.01 * x, samples=True)
-    chambers = np.zeros((16, 2))
-    found = collinear_regressors(readings, chambers)
+    readings = replace(readings, chamber_pressures=np.zeros((16, 2)))
+    found = collinear_regressors(readings)
     assert bool(found) is told
     assert not told or found == [('speed', 'pressure of the seals', pytest.approx(correlation))]
     still = replace(readings, at=readings.at._replace(velocity=0.05 * readings.at.direction))
-    assert collinear_regressors(still, chambers) == []  # what was not varied goes with nothing
+    assert collinear_regressors(still) == []  # what was not varied goes with nothing
     unknown = replace(readings, at=readings.at._replace(velocity=np.full(16, np.nan)))
-    assert collinear_regressors(unknown, chambers) == []
+    assert collinear_regressors(unknown) == []
 
 
 def test_held_pressures_are_compared_by_their_means_and_take_three():
-    readings = made([10, 20, 40], [10.0] * 3, [0.01, 0.02, 0.04])
-    assert [found.correlation for found in collinear_regressors(readings, np.zeros((6, 2)))] == pytest.approx([1.0])
-    assert collinear_regressors(readings.taken(readings.level < 2), np.zeros((4, 2))) == []
+    readings = replace(made([10, 20, 40], [10.0] * 3, [0.01, 0.02, 0.04]), chamber_pressures=np.zeros((6, 2)))
+    assert [found.correlation for found in collinear_regressors(readings)] == pytest.approx([1.0])
+    assert collinear_regressors(readings.taken(readings.level < 2)) == []
 
 
 def test_velocity_and_pressure_difference_go_together():
     readings = made(np.full(4, 20.0), [10.0] * 4, [0.01, 0.02, 0.03, 0.04], samples=True)
     chambers = np.column_stack((20.0 + 1e3 * readings.at.velocity, 20.0 - 1e3 * readings.at.velocity)) * BAR
-    (found,) = collinear_regressors(readings, chambers)
+    (found,) = collinear_regressors(replace(readings, chamber_pressures=chambers))
     assert found == ('velocity', 'pressure difference', pytest.approx(1.0))
 
 

@@ -27,7 +27,7 @@ def measured(pressure, speed, rng, source=0, offset=1.5, scatter=SCATTER) -> Fri
     """Readings of two seals at each pressure and speed in both directions, one by one left out by tenths."""
     pressure, speed = np.repeat(pressure, 2), np.repeat(speed, 2)
     direction = np.tile([-1.0, 1.0], len(pressure) // 2)
-    at = OperatingConditions(np.repeat(pressure[:, None], 2, axis=1), None, direction * speed, direction)
+    at = OperatingConditions(np.repeat(pressure[:, None], 2, axis=1), direction * speed, direction)
     friction = VISCOUS.friction(at, TRUE) * (1.0 + scatter * rng.normal(size=len(pressure)))
     index = np.arange(len(pressure))
     return FrictionReadings(
@@ -45,7 +45,7 @@ def collinear(rng, repeats=4) -> FrictionReadings:
 
 def joined(one: FrictionReadings, other: FrictionReadings) -> FrictionReadings:
     at = OperatingConditions(
-        np.concatenate((one.at.pressure, other.at.pressure)), None,
+        np.concatenate((one.at.pressure, other.at.pressure)),
         np.concatenate((one.at.velocity, other.at.velocity)), np.concatenate((one.at.direction, other.at.direction)),
     )  # fmt: skip
     columns = {n: np.concatenate((getattr(one, n), getattr(other, n))) for n in ('force', 'source', 'group')}
@@ -56,7 +56,7 @@ def joined(one: FrictionReadings, other: FrictionReadings) -> FrictionReadings:
 def conditions(points) -> OperatingConditions:
     pressure, speed = np.repeat(np.array(points), 2, axis=0).T
     direction = np.tile([-1.0, 1.0], len(points))
-    return OperatingConditions(np.repeat(pressure[:, None], 2, axis=1), None, direction * speed, direction)
+    return OperatingConditions(np.repeat(pressure[:, None], 2, axis=1), direction * speed, direction)
 
 
 def over_range(design) -> OperatingConditions:

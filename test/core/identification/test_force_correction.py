@@ -5,7 +5,7 @@ import pytest
 
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
 from seal_friction_ros.core.identification.force_correction import force_correction
-from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
+from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.signal_preparation import Signals
 
 FRICTION, CONSTANT = 20.0, -3.0  # [N]
@@ -19,11 +19,13 @@ def prepared(area, noise=(0.0,) * 5, pressures=LEVELS, other=0.0, chamber='a', s
     pressure = pressures[level]
     force = direction * FRICTION + CONSTANT + area * pressure + np.array(noise)[level]
     both = np.column_stack((pressure, other * pressure))
-    at = OperatingConditions(pressure[:, np.newaxis], None, 0.02 * direction, direction)
+    at = OperatingConditions(pressure[:, np.newaxis], 0.02 * direction, direction)
     parts = tuple(np.full(11, one) for one in force) if samples else ()
     zeros = np.zeros(len(level), dtype=int)
-    readings = FrictionReadings(at, force, zeros, level, level, ('log',), 'pressure', False, parts)
-    return PreparedReadings(readings, both if chamber == 'a' else both[:, ::-1], None, ())
+    chambers = both if chamber == 'a' else both[:, ::-1]
+    return FrictionReadings(
+        at, force, zeros, level, level, ('log',), 'pressure', False, parts, chamber_pressures=chambers
+    )
 
 
 @pytest.mark.parametrize('chamber', ['a', 'b'])

@@ -17,7 +17,7 @@ def readings(friction, bars=(5, 10, 20, 40, 60, 80), speeds=(0.01, 0.02, 0.05, 0
     rows = [(i, p, v, side) for i, p in enumerate(bars) for v in speeds for side in (1.0, -1.0) for _ in range(2)]
     level, pressure, speed, side = np.array(rows).T
     force = side * friction(pressure, speed, side) * (1.0 + noise * rng.normal(size=len(side))) + offset
-    at = OperatingConditions(pressure[:, np.newaxis] * BAR, None, side * speed, side)
+    at = OperatingConditions(pressure[:, np.newaxis] * BAR, side * speed, side)
     level = level.astype(int)
     return FrictionReadings(at, force, np.zeros_like(level), level, level, ('log',), 'pressure', are_samples=False)
 
@@ -47,8 +47,8 @@ def test_a_friction_without_pressure_needs_no_kind():
 
 def test_what_the_pressures_do_not_tell_stays_at_its_prior():
     found = fit_model(readings(lambda p, v, _: 20.0 + 0.5 * p + 0.0 * v, bars=(30, 30.1)), [(0,)], ALL)
-    far = OperatingConditions(np.array([[90.0 * BAR]]), None, np.array([0.03]), np.array([1.0]))
-    near = OperatingConditions(np.array([[30.0 * BAR]]), None, np.array([0.03]), np.array([1.0]))
+    far = OperatingConditions(np.array([[90.0 * BAR]]), np.array([0.03]), np.array([1.0]))
+    near = OperatingConditions(np.array([[30.0 * BAR]]), np.array([0.03]), np.array([1.0]))
     assert found.friction(near)[0] == pytest.approx(35.0, rel=0.02)
     assert found.std(near)[0] < 0.05 * 35.0
     assert found.std(far)[0] > 0.3 * found.friction(far)[0]

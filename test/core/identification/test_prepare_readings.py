@@ -35,7 +35,7 @@ def test_manual_readings_get_the_sign_of_their_direction_and_every_seal_the_pres
     assert readings.at.velocity.tolist() == [0.02, -0.02] * 6
     assert readings.force[:4].tolist() == [9.5, -9.5, 20.0, -20.0]
     assert readings.level.tolist() == [0, 0, 1, 1, 2, 2] * 2
-    assert prepared.chamber_pressures.tolist() == [[p, p] for p in readings.at.pressure[:, 0]]
+    assert readings.chamber_pressures.tolist() == [[p, p] for p in readings.at.pressure[:, 0]]
     assert (prepared.breakaway, prepared.accounts) == (None, (Account('sheet', 12, {}),))
     assert not readings.are_samples
 
@@ -98,7 +98,7 @@ def test_each_stroke_of_a_log_is_a_reading_of_the_chamber_of_each_seal():
     assert readings.at.direction.tolist() == [1.0, -1.0] * 3
     assert readings.at.velocity == pytest.approx(np.array([0.03, -0.03] * 3))
     assert readings.at.pressure[::2] == pytest.approx(np.array([[2.5, 5, 2.5], [7.5, 15, 7.5], [15, 30, 15]]) * BAR)
-    assert prepared.chamber_pressures[::2] == pytest.approx(np.array([[5, 2.5], [15, 7.5], [30, 15]]) * BAR)
+    assert readings.chamber_pressures[::2] == pytest.approx(np.array([[5, 2.5], [15, 7.5], [30, 15]]) * BAR)
     sizes = FRICTION + np.repeat([5.0, 15.0, 30.0], 2)
     assert readings.force == pytest.approx(OFFSET + np.tile([1.0, -1.0], 3) * sizes)
     assert readings.level.tolist() == readings.group.tolist() == [0, 0, 1, 1, 2, 2]

@@ -64,11 +64,11 @@ def log(seals, noise=0.3, step=0.0, periods=8, friction=FRICTION, offset=OFFSET)
 def test_stiffness_and_exponent_are_found_within_their_standard_errors(stiffness, exponent):
     fit = fit_presliding([log([Presliding(stiffness=stiffness, yield_exponent=exponent)])])
     miss = np.log(fit.presliding.stiffness / stiffness)
-    assert miss == pytest.approx(0.0, abs=4.0 * fit.relative_stiffness_std + 0.03)
+    assert miss == pytest.approx(0.0, abs=4.0 * fit.presliding.relative_std + 0.03)
     assert fit.presliding.yield_exponent == pytest.approx(exponent, abs=4.0 * fit.yield_exponent_std + 0.1)
     assert fit.friction == pytest.approx([FRICTION], abs=0.3)
     assert fit.offset == pytest.approx([OFFSET], abs=0.3)
-    assert fit.relative_stiffness_std < 0.2
+    assert fit.presliding.relative_std < 0.2
     assert fit.presliding.memory_length == fit.presliding.dwell_time == 0.0  # there is none
 
 
@@ -86,7 +86,7 @@ def test_logs_at_several_pressures_share_the_elasticity():
     fit = fit_presliding([log([seal]), log([seal], friction=35.0, offset=4.0)])
     assert fit.friction == pytest.approx([FRICTION, 35.0], abs=0.3)
     assert fit.offset == pytest.approx([OFFSET, 4.0], abs=0.3)
-    assert fit.presliding.stiffness == pytest.approx(2e5, rel=4.0 * fit.relative_stiffness_std + 0.03)
+    assert fit.presliding.stiffness == pytest.approx(2e5, rel=4.0 * fit.presliding.relative_std + 0.03)
 
 
 def test_reversals_kept_back_of_two_seals_unlike_each_other_are_predicted_better_than_by_rigid_seals():
@@ -278,7 +278,7 @@ def test_readings_up_to_a_displacement_hold_it():
 def test_the_way_to_sliding_is_that_of_the_last_element():
     for exponent, share in ((0.0, 2.0), (1.0, 2.0 * 5.5 / 3.0)):  # six elements; the last has 5.5 of 18 parts
         seal = Presliding(stiffness=1e5, yield_exponent=exponent)
-        fit = PreslidingFit(seal, (15.0, 25.0), (0.0, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 8, 1e-3)
+        fit = PreslidingFit(seal, (15.0, 25.0), (0.0, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 8, 1e-3)
         last = share * 20.0 / 1e5  # at the mean friction of both logs
         assert fit.full_yield == pytest.approx(last)
         shared = np.array([np.log(1e5), exponent, 0.0, 0.0, -np.inf])
@@ -339,7 +339,7 @@ def test_standard_errors_are_those_of_the_jackknife_over_twenty_groups_of_revers
     without = [fit_curves(some, ['log'], 3e-3) for some in left]
     values = [(np.log(one.presliding.stiffness), one.presliding.yield_exponent) for one in without]
     errors = np.sqrt((groups - 1) * np.var(values, axis=0))
-    assert (fit.relative_stiffness_std, fit.yield_exponent_std) == pytest.approx(tuple(errors), rel=0.05)
+    assert (fit.presliding.relative_std, fit.yield_exponent_std) == pytest.approx(tuple(errors), rel=0.05)
     assert np.isnan([fit.relative_memory_length_std, fit.relative_dwell_time_std]).all()
 
 
@@ -355,7 +355,7 @@ def test_curves_made_by_the_equation_give_its_parameters_back():
     assert (fit.friction, fit.offset) == (pytest.approx((20.0, 35.0), abs=0.02), pytest.approx((-1.5, 4.0), abs=0.02))
     assert (fit.reversals, fit.length) == (16, 3e-3)
     assert fit.rms == pytest.approx(0.02, rel=0.05)
-    assert 0.0 < fit.relative_stiffness_std == found.relative_std < 0.01
+    assert 0.0 < fit.presliding.relative_std == found.relative_std < 0.01
     errors = fit.yield_exponent_std, fit.relative_memory_length_std, fit.relative_dwell_time_std
     assert 0.0 < min(errors) < max(errors) < 0.02
 

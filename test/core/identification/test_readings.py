@@ -31,7 +31,7 @@ def held(bars, frictions, offsets=0.0, sources=1, samples=False, count=1):
     source, level, direction = np.array(rows).T
     source, level = source.astype(int), level.astype(int)
     force = direction * np.asarray(frictions, float)[level] + np.broadcast_to(offsets, len(bars))[level]
-    at = OperatingConditions(np.asarray(bars, float)[level][:, np.newaxis] * BAR, None, 0.02 * direction, direction)
+    at = OperatingConditions(np.asarray(bars, float)[level][:, np.newaxis] * BAR, 0.02 * direction, direction)
     names = tuple(f'log {s}' for s in range(sources))
     return FrictionReadings(at, force, source, level, level, names, 'pressure', samples)
 
@@ -47,7 +47,7 @@ def test_friction_and_offset_of_several_sources_are_their_mean_weighted_with_the
     one, other = held([10.0], [20.0], 4.0), held([10.0], [26.0], -2.0, count=3)
     both = FrictionReadings(
         OperatingConditions(
-            np.concatenate((one.at.pressure, other.at.pressure)), None,
+            np.concatenate((one.at.pressure, other.at.pressure)),
             np.concatenate((one.at.velocity, other.at.velocity)),
             np.concatenate((one.at.direction, other.at.direction)),
         ),

@@ -32,7 +32,7 @@ def run(course, count=20, scatter=0.005, seed=0, pressures=1, offset=0.0, travel
         noise[i] = follows * noise[i - 1] + np.sqrt(1.0 - follows**2) * noise[i]
     friction = SETTLED * (1.0 + source) * course(way) * (1.0 + scatter * noise)
     direction = np.tile([1.0, -1.0], len(way) // 2)
-    at = OperatingConditions(1e5 * (1.0 + source[:, np.newaxis]), None, 0.01 * direction, direction)
+    at = OperatingConditions(1e5 * (1.0 + source[:, np.newaxis]), 0.01 * direction, direction)
     return FrictionReadings(
         at=at,
         force=offset + direction * friction,

@@ -59,10 +59,10 @@ def cylinder(
     both = np.column_stack((a, b)) * BAR
     force = np.sign(velocity) * friction * scatter + OFFSET + both @ np.array(areas)
     chambers = [chamber for kind in kinds for chamber in kind.chambers]
-    at = OperatingConditions(pressures_at_seals(chambers, *both.T), None, velocity, np.sign(velocity))
+    at = OperatingConditions(pressures_at_seals(chambers, *both.T), velocity, np.sign(velocity))
     zeros = np.zeros(len(a), dtype=int)
-    plain = FrictionReadings(at, force, zeros, zeros, zeros, ('log',), 'pressure', are_samples=False)
-    return kinds_readings(plain, both, kinds)
+    plain = FrictionReadings(at, force, zeros, zeros, zeros, ('log',), 'pressure', False, chamber_pressures=both)
+    return kinds_readings(plain, kinds)
 
 
 def law_of(data):
@@ -98,7 +98,7 @@ def test_each_pair_of_pressures_is_a_condition_that_is_left_out_as_a_whole():
     assert [columns_of(data.kinds, k) for k in range(2)] == [slice(0, 2), slice(2, 3)]
     np.testing.assert_allclose(pressure_sums(data)[:, 0], 2.0 * data.chamber_pressures[:, 0] / BAR)
     swept = replace(data, are_samples=True)
-    np.testing.assert_array_equal(kinds_readings(swept, data.chamber_pressures, data.kinds).level, swept.level)
+    np.testing.assert_array_equal(kinds_readings(swept, data.kinds).level, swept.level)
 
 
 def test_a_cylinder_without_noise_is_found_again_with_every_part(exact):
@@ -318,11 +318,11 @@ def test_held_pressures_of_both_directions_of_a_log_are_one_condition():
     off = (chambers[:, 0] == 30e5) & (plain.at.direction < 0.0)
     chambers[off, 0] = 31e5
     pressure = pressures_at_seals(('a', 'a', 'difference'), *chambers.T)
-    data = kinds_readings(replace(plain, at=plain.at._replace(pressure=pressure)), chambers, (ROD, PISTON))
+    data = kinds_readings(replace(plain, at=plain.at._replace(pressure=pressure)), (ROD, PISTON))
     assert len(data.levels) == 3
     chambers[off, 0] = 40e5
     pressure = pressures_at_seals(('a', 'a', 'difference'), *chambers.T)
-    data = kinds_readings(replace(plain, at=plain.at._replace(pressure=pressure)), chambers, (ROD, PISTON))
+    data = kinds_readings(replace(plain, at=plain.at._replace(pressure=pressure)), (ROD, PISTON))
     assert len(data.levels) == 4
 
 

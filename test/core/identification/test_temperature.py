@@ -43,7 +43,7 @@ def readings(temperatures, *, seed=0, scale=exponential, run_to_run=0.0, noise=0
     source, level, side, kelvin, force, progress = np.array(rows).T
     pressure = (1.0 + 2.0 * level)[:, np.newaxis] * BAR
     return FrictionReadings(
-        OperatingConditions(pressure, None, 0.02 * side, side),
+        OperatingConditions(pressure, 0.02 * side, side),
         force,
         source.astype(int),
         source.astype(int),

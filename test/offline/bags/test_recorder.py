@@ -19,9 +19,8 @@ from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE
 from seal_friction_ros.offline.bags import mcap_writer
 from seal_friction_ros.offline.bags import recorder as recorder_module
 from seal_friction_ros.offline.bags.bag import BagError, BagWriter, read_messages, timed_name
-from seal_friction_ros.offline.bags.recorder import Recorder
+from seal_friction_ros.offline.bags.recorder import Recorder, delete_oldest
 from seal_friction_ros.offline.bags.recover import recover
-from seal_friction_ros.offline.bags.retention import delete_oldest
 
 
 def record(recorder: Recorder, number: int) -> None:

@@ -93,8 +93,8 @@ def test_a_node_that_knows_no_temperature_is_as_unsure_as_the_temperatures_make_
 
 def test_a_column_in_celsius_is_read_in_kelvin_and_a_pressure_is_no_temperature(logs, tmp_path):
     read = read_samples(logs / '25.csv', read_rig(logs / 'with.yaml'))
-    assert read.temperature[0] == pytest.approx(298.15)
-    assert read_samples(logs / '25.csv', read_rig(logs / 'without.yaml')).temperature is None
+    assert read.track.temperature[0] == pytest.approx(298.15)
+    assert read_samples(logs / '25.csv', read_rig(logs / 'without.yaml')).track.temperature is None
     wrong = tmp_path / 'wrong.yaml'
     wrong.write_text(RIG + 'temperature: {column_name: pressure, unit: bar}\n')
     with pytest.raises(ValueError, match='is not a temperature: use one of K, degC'):

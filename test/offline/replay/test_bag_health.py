@@ -105,7 +105,7 @@ def test_what_is_learnt_replays_to_the_same_bytes_one_by_one_and_compiled(mode, 
 def test_bags_are_followed_in_parallel_as_one_by_one_by_code_that_is_compiled_before(week):
     override = chosen_configuration(None, SEAL)
     alone = [bag_health(bag, '', override) for bag in week]
-    together = [outcome.result for outcome in health_of_bags(week, '', override, workers=2)]
+    together = [outcome.result for outcome in health_of_bags(week, Chosen(override=override), workers=2)]
     for one, other in zip(alone, together, strict=True):
         np.testing.assert_equal(one[:7], other[:7])
     with event.install_recorder('numba:compile') as compilations:
