@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from core.estimation.test_compiled_pipeline import ACTUATORS, DEFAULT, TYPES, noisy, receipts, with_seals
-from harness.c_library import CEstimator, to_struct
+from harness.c_library import CEstimator, first_configuration, to_struct
 from offline.commands.test_main import PULL_TEST
 from paths import ROOT
 
@@ -22,7 +22,6 @@ from seal_friction_ros.core.estimation.pipeline import answered, init, is_tick_d
 from seal_friction_ros.core.friction.states import StateFriction
 from seal_friction_ros.core.messages.coder import decode, encode, type_of
 from seal_friction_ros.core.messages.records import Clock, FrictionEstimate, Status, Velocity, WatchdogTick, numbers_in
-from seal_friction_ros.offline.bags.actuator_bag import first_snapshot as first_of_bag
 from seal_friction_ros.offline.bags.actuator_bag import open_actuator
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.export.c_library import digest, example_samples, sources
@@ -95,14 +94,6 @@ def test_a_reference_bag_gives_its_recorded_bytes(bag: str, tmp_path: Path):
             assert found == without_frame([(answer.type_name, answer.data) for answer in step.answers])
             compared += len(found)
     assert compared > 300
-
-
-def first_configuration(bag: str):
-    """Configuration at the beginning of a reference bag."""
-    source = open_actuator(ROOT / 'bags' / bag)
-    first = first_of_bag(source.path, source.messages(), source.topics.configuration)
-    assert first is not None
-    return first.configurations['']
 
 
 def test_a_step_of_a_loop_is_that_of_python(fresh: CEstimator):
