@@ -3,6 +3,7 @@
 import ctypes
 import math
 import re
+import shutil
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -170,6 +171,17 @@ def test_the_folder_makes_the_examples_and_both_answer_what_python_computes(expo
     assert len(log) > 300
     for name in ('friction_force', 'coulomb_friction', 'coulomb_friction_std', 'state', 'status'):
         assert np.array_equal(log[name], replayed[name]), name
+
+
+def test_a_machine_with_a_c_compiler_alone_makes_and_runs_the_example(exported: Path, tmp_path: Path):
+    folder = shutil.copytree(
+        exported, tmp_path / 'copy', ignore=shutil.ignore_patterns('*.o', '*.a', '*.so', 'example_*')
+    )
+    for tool in ('make', 'cc', 'as', 'ld', 'ar', 'sh', 'cmp', 'tail'):
+        (tmp_path / tool).symlink_to(str(shutil.which(tool)))
+    subprocess.run(['make', '-s', 'CFLAGS=-O0'], cwd=folder, check=True, env={'PATH': str(tmp_path)})
+    assert (folder / 'answers.csv').stat().st_size > 10_000
+    assert not (folder / 'example_cpp').exists()
 
 
 def test_the_library_tells_its_configuration_and_needs_nothing_but_libm(exported: Path):
