@@ -4,22 +4,20 @@ import ctypes
 import dataclasses
 import math
 import re
-import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from fmpy import extract, read_model_description, simulate_fmu
+from fmpy import extract, simulate_fmu
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
-from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 from harness.compensation import COMPENSATING
+from harness.fmu import got, put, running
 from paths import ROOT
 
 from seal_friction_ros import Estimator
@@ -48,42 +46,6 @@ def exported(request, tmp_path_factory) -> tuple[str, Path]:
     else:
         assert export_fmu(CONFIGURATION, path, model, fmi).has_binary
     return model, path
-
-
-@contextmanager
-def running(path: Path) -> Iterator[tuple[Any, dict[str, Any]]]:
-    """An instance of an FMU after its initialisation, and its variables by name."""
-    description, folder = read_model_description(path), extract(path)
-    kind = FMU2Slave if description.fmiVersion == '2.0' else FMU3Slave
-    identifier = description.coSimulation.modelIdentifier
-    fmu = kind(guid=description.guid, unzipDirectory=folder, modelIdentifier=identifier, instanceName='one')
-    fmu.instantiate()
-    if kind is FMU2Slave:
-        fmu.setupExperiment(startTime=0.0)
-    fmu.enterInitializationMode()
-    fmu.exitInitializationMode()
-    yield fmu, {variable.name: variable for variable in description.modelVariables}
-    fmu.terminate()
-    fmu.freeInstance()
-    shutil.rmtree(folder)
-
-
-def put(fmu: Any, variables: dict[str, Any], record: Any) -> None:
-    """Set the inputs that are named as fields of a record."""
-    names = [name for name in record._fields if name != 'stamp']
-    function = fmu.setReal if isinstance(fmu, FMU2Slave) else fmu.setFloat64
-    function([variables[name].valueReference for name in names], [getattr(record, name) for name in names])
-
-
-def got(fmu: Any, variables: dict[str, Any], names: list[str]) -> list[float]:
-    found = []
-    for name in names:
-        variable = variables[name]
-        is_real = variable.type in ('Real', 'Float64')
-        function = 'get' + ({True: 'Real', False: 'Integer'} if isinstance(fmu, FMU2Slave) else
-                            {True: 'Float64', False: 'Int64'})[is_real]  # fmt: skip
-        found += getattr(fmu, function)([variable.valueReference])
-    return found
 
 
 def samples() -> Iterator[LoopSample]:

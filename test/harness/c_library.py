@@ -6,8 +6,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from paths import ROOT
+
+from seal_friction_ros.core.estimation.configuration import Configuration
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState
 from seal_friction_ros.core.messages.coder import encode, type_of
+from seal_friction_ros.offline.bags.actuator_bag import first_snapshot, open_actuator
 from seal_friction_ros.offline.export.c_library import ANSWERS, sources
 from seal_friction_ros.offline.export.c_types import fields_of, snake
 
@@ -35,6 +39,15 @@ def to_record(kind: Any, struct: Any) -> Any:
     if kind in _NUMBERS:
         return struct
     return kind(**{name: to_record(each, getattr(struct, name)) for name, each in fields_of(kind).items()})
+
+
+def first_configuration(bag: str) -> Configuration:
+    """Configuration at the beginning of a reference bag."""
+    source = open_actuator(ROOT / 'bags' / bag)
+    first = first_snapshot(source.path, source.messages(), source.topics.configuration)
+    assert first is not None
+    configuration: Configuration = first.configurations['']
+    return configuration
 
 
 class CEstimator:

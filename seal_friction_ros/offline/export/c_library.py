@@ -57,7 +57,7 @@ class Export(NamedTuple):
 
     def summary(self) -> str:
         """One line."""
-        built = 'libraries and examples are built' if self.is_built else 'not built, since there is no make, cc or c++'
+        built = 'libraries and examples are built' if self.is_built else 'not built, since there is no make or cc'
         return f'{self.folder}: C library of configuration {self.hash[:12]}, {built}'
 
 
@@ -78,7 +78,7 @@ def export_c(configuration: Configuration, folder: Path, name: str = 'seal_frict
     folder.mkdir(parents=True, exist_ok=True)
     for file_name, text in made.items():
         (folder / file_name).write_text(text, encoding='utf-8')
-    can_build = all(map(shutil.which, ('make', 'cc', 'c++')))
+    can_build = all(map(shutil.which, ('make', 'cc')))
     if can_build:
         build(['make', '-s', 'build'], folder)
     return Export(folder, digest(document), can_build)

@@ -2,12 +2,13 @@
 
 import math
 from dataclasses import replace
+from functools import cache
 from statistics import fmean
 from typing import NamedTuple
 
 import pytest
 from harness.learnt import learnt_state
-from harness.simulated_day import SECOND, START, Day, samples
+from harness.simulated_day import SECOND, START, Day, nothing, samples
 from hypothesis import given
 from hypothesis import strategies as st
 from paths import ROOT
@@ -68,8 +69,9 @@ class Run(NamedTuple):
         return [estimate for estimate in self.estimates if estimate.stamp - START >= seconds * SECOND]
 
 
+@cache
 def run(day, seconds, seed=0, known=None, changed=lambda sample: sample) -> Run:
-    """A day, estimated by `known`; every sample may be `changed` before."""
+    """A day, estimated by `known`; every sample may be `changed` before. Cases share it: nothing may change it."""
     known = known or parameters()
     state, estimates, reversals = estimator.init(known), [], []
     for sample in samples(day, seconds, seed):
@@ -512,13 +514,18 @@ def delayed(samples_late):
     return changed
 
 
+@cache
+def friction_of(day):
+    """Force sum of a minute [N], by stamp."""
+    return {sample.stamp: sample.force.force for sample in samples(day, 60.0, 0)}
+
+
 def wrong(found, day, seconds=5.0):
     """Estimates with status 0 that are more than 1.96 deviations from the friction of the machine, as a share."""
-    estimates = found.since(seconds)
-    truth = {sample.stamp: sample for sample in samples(replace(day, noise=0.0, mass=0.0, load=lambda _: 0.0), 60.0, 0)}
+    estimates, truth = found.since(seconds), friction_of(replace(day, noise=0.0, mass=0.0, load=nothing))
     return fmean(
         estimate.status == 0
-        and abs(estimate.friction_force - truth[estimate.stamp].force.force) > 1.96 * estimate.friction_force_std
+        and abs(estimate.friction_force - truth[estimate.stamp]) > 1.96 * estimate.friction_force_std
         for estimate in estimates
     )
 

@@ -1,5 +1,6 @@
 """Compiled code on disk refers to the types of records and laws by names from which any process makes them again."""
 
+import gc
 import pickle
 import subprocess
 import sys
@@ -7,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from numba.core import event
 
 from seal_friction_ros.core.foundation import compiled
 from seal_friction_ros.core.foundation.compiled import bound, evaluate, for_compiler, keep, unrolled
@@ -54,6 +56,22 @@ def _sum(records, pressure):
 @compiled.compiled
 def _kept_sum(kept):
     return kept.value[0] + kept.value[1]
+
+
+def test_garbage_is_seldom_collected_while_a_function_is_compiled_and_as_before_after_it():
+    before, seen = gc.get_threshold(), set()
+
+    class Told(event.Listener):
+        def on_start(self, _event):
+            seen.add(gc.get_threshold()[0])
+
+        def on_end(self, _event):
+            seen.add(gc.get_threshold()[0])
+
+    with event.install_listener('numba:compile', Told()):
+        assert compiled.compiled(lambda x: x + 1.0)(1.0) == 2.0
+    assert seen == {compiled.NEW_RECORDS}
+    assert gc.get_threshold() == before
 
 
 def test_compiled_code_evaluates_laws_and_tables_as_python_does():

@@ -3,6 +3,7 @@
 import ctypes
 import math
 import re
+import shutil
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from core.estimation.test_compiled_pipeline import ACTUATORS, DEFAULT, TYPES, noisy, receipts, with_seals
-from harness.c_library import CEstimator, to_struct
+from harness.c_library import CEstimator, first_configuration, to_struct
 from offline.commands.test_main import PULL_TEST
 from paths import ROOT
 
@@ -22,7 +23,6 @@ from seal_friction_ros.core.estimation.pipeline import answered, init, is_tick_d
 from seal_friction_ros.core.friction.states import StateFriction
 from seal_friction_ros.core.messages.coder import decode, encode, type_of
 from seal_friction_ros.core.messages.records import Clock, FrictionEstimate, Status, Velocity, WatchdogTick, numbers_in
-from seal_friction_ros.offline.bags.actuator_bag import first_snapshot as first_of_bag
 from seal_friction_ros.offline.bags.actuator_bag import open_actuator
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.export.c_library import digest, example_samples, sources
@@ -95,14 +95,6 @@ def test_a_reference_bag_gives_its_recorded_bytes(bag: str, tmp_path: Path):
             assert found == without_frame([(answer.type_name, answer.data) for answer in step.answers])
             compared += len(found)
     assert compared > 300
-
-
-def first_configuration(bag: str):
-    """Configuration at the beginning of a reference bag."""
-    source = open_actuator(ROOT / 'bags' / bag)
-    first = first_of_bag(source.path, source.messages(), source.topics.configuration)
-    assert first is not None
-    return first.configurations['']
 
 
 def test_a_step_of_a_loop_is_that_of_python(fresh: CEstimator):
@@ -179,6 +171,17 @@ def test_the_folder_makes_the_examples_and_both_answer_what_python_computes(expo
     assert len(log) > 300
     for name in ('friction_force', 'coulomb_friction', 'coulomb_friction_std', 'state', 'status'):
         assert np.array_equal(log[name], replayed[name]), name
+
+
+def test_a_machine_with_a_c_compiler_alone_makes_and_runs_the_example(exported: Path, tmp_path: Path):
+    folder = shutil.copytree(
+        exported, tmp_path / 'copy', ignore=shutil.ignore_patterns('*.o', '*.a', '*.so', 'example_*')
+    )
+    for tool in ('make', 'cc', 'as', 'ld', 'ar', 'sh', 'cmp', 'tail'):
+        (tmp_path / tool).symlink_to(str(shutil.which(tool)))
+    subprocess.run(['make', '-s', 'CFLAGS=-O0'], cwd=folder, check=True, env={'PATH': str(tmp_path)})
+    assert (folder / 'answers.csv').stat().st_size > 10_000
+    assert not (folder / 'example_cpp').exists()
 
 
 def test_the_library_tells_its_configuration_and_needs_nothing_but_libm(exported: Path):
