@@ -7,7 +7,9 @@ the rod accelerates.
 
 **Consistency.** Each sample of a sliding rod is compared with what the filter expects. An innovation of more than
 `IMPLAUSIBLE` standard deviations, or a mean over `SHORT_TIME` of more than `LASTING`, is not explained by anything that
-the filter knows: then nobody knows whether it is friction, so the estimate is marked, whatever caused it.
+the filter knows: then nobody knows whether it is friction, so the estimate is marked, whatever caused it. So is one
+whose force sum only an offset explains, before both directions have told friction from offset: the rod may be held. A
+slow rod may be at rest while its sensor has a zero: outliers are not learnt from there, and mark earlier.
 
 Source: normalised innovations as a check of consistency, [BarShalom2001]_ chapter 5; friction as the half difference of
 the two directions, as the thesis evaluates Tables A-1 to A-3. All numbers are our choice.
@@ -358,6 +360,7 @@ def outlook_of(
         way: Of the rod since the last reading [m].
         bias: Mean of the normalised innovations [-].
         acceleration: [m/s^2]
+        may_rest: Whether the velocity may be the zero of its sensor: then a smaller innovation contradicts.
     """
     inertia = settings.moving_mass * acceleration
     if known.stamp == NEVER:

@@ -354,7 +354,7 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
 
 @compilable
 def disregarded(known: FrictionFilter, reading: Reading, elapsed: float) -> FrictionFilter:
-    """Filter after a reading that is far away and may be one of a rod at rest: nothing is learnt, but the band holds it.
+    """Filter after an outlier of a rod that may be at rest: nothing is learnt from it, but the band holds it.
 
     Args:
         known: Before the reading.
