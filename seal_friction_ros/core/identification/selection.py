@@ -5,14 +5,16 @@ is told by a line. A law whose parameters the data do not determine is not recom
 """
 
 import math
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from scipy.special import stdtrit
 
-from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.identification.candidate_laws import (
     CandidateLaw,
     Variation,
@@ -22,7 +24,7 @@ from seal_friction_ros.core.identification.candidate_laws import (
 from seal_friction_ros.core.identification.diagnostics import LEVEL_SCATTER
 from seal_friction_ros.core.identification.fitting import LawFit, fit
 from seal_friction_ros.core.identification.readings import FrictionReadings, are_far_apart, has_pressures
-from seal_friction_ros.core.identification.validation import CrossValidation, cross_validate
+from seal_friction_ros.core.identification.validation import CrossValidation, Ticks, cross_validate, predict
 
 BEATEN_CONFIDENCE = 0.95  # of the test whether a law is beaten (our choice)
 WORTHWHILE = 0.1  # share of its loss by which a law must be beaten (our choice)
@@ -104,7 +106,6 @@ class NotScored(NamedTuple):
 
 
 Scores = Sequence[LawScore | NotScored]
-Ticks = Callable[[int], None]
 
 
 def scored(scores: Scores) -> list[LawScore]:
@@ -225,6 +226,57 @@ def is_beaten(losses: FloatArray, others: FloatArray) -> bool:
     error = float(difference.std(ddof=1)) / math.sqrt(groups)
     noise = float(stdtrit(groups - 1, BEATEN_CONFIDENCE)) * error
     return float(difference.mean()) > max(noise, WORTHWHILE * float(losses.mean()))
+
+
+class ChosenAnew(NamedTuple):
+    """Prediction of each group by a law that was chosen and fitted without it."""
+
+    predicted: FloatArray  # [N] shape (n,); NaN where no law could be chosen
+    laws: tuple[str, ...]  # name of the law without each group; '' where none could be chosen
+
+
+class LeftOut(NamedTuple):
+    """Prediction of one group by a law that was chosen and fitted without it."""
+
+    predicted: FloatArray  # [N] shape (readings of the group,); NaN where no law could be chosen
+    law: str  # its name; '' where none could be chosen
+
+
+Chosen = Callable[[Sequence[Callable[[], LeftOut]]], Sequence[LeftOut]]
+"""runs independent calls and returns their results in order"""
+
+
+def choose_anew(
+    readings: FrictionReadings,
+    choose: Callable[[FrictionReadings], LawScore],
+    run: Chosen = lambda calls: list(map(operator.call, calls)),
+) -> ChosenAnew:
+    """Predict each group by the law that ``choose`` recommends for the other groups.
+
+    Unlike `cross_validate`, which fits a given law anew, the choice of the law has not seen the group either. ``run``
+    computes the groups, which are independent of each other.
+
+    Source: nested cross-validation, [VarmaSimon2006]_.
+    """
+    groups = list(readings.groups)
+    found = run([partial(choose_without, readings, out, choose) for out in groups])
+    predicted = np.full(readings.count, np.nan)
+    for out, one in zip(groups, found, strict=True):
+        predicted[out] = one.predicted
+    return ChosenAnew(predicted, tuple(one.law for one in found))
+
+
+def choose_without(
+    readings: FrictionReadings, out: BoolArray, choose: Callable[[FrictionReadings], LawScore]
+) -> LeftOut:
+    """Predict the readings ``out`` by the law that ``choose`` recommends for the others."""
+    others, left_out = readings.without(out), readings.taken(out)
+    try:
+        chosen = choose(others)
+    except ValueError:
+        return LeftOut(np.full(left_out.count, np.nan), '')
+    _, predicted, _ = predict(chosen.law, others, left_out, chosen.fit.values)
+    return LeftOut(predicted, chosen.law.name)
 
 
 def collinear_spread(scores: Scores, selected: LawFit, readings: FrictionReadings) -> float:

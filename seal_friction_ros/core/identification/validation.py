@@ -5,7 +5,7 @@ readings give the same result.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple, cast
 
@@ -19,6 +19,8 @@ from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, P
 from seal_friction_ros.core.identification.fitting import fit, offsets_of, root_mean_square, values_of_model
 from seal_friction_ros.core.identification.friction_model import ModelFit
 from seal_friction_ros.core.identification.readings import FrictionReadings
+
+Ticks = Callable[[int], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,10 +48,12 @@ class CrossValidation:
         return float(np.abs(self.deviation).mean())
 
 
-def cross_validate(law: CandidateLaw, readings: FrictionReadings, near: ParameterValues) -> CrossValidation:
+def cross_validate(
+    law: CandidateLaw, readings: FrictionReadings, near: ParameterValues, tick: Ticks = lambda _: None
+) -> CrossValidation:
     """Predict each group (of two at least) by the law fitted to all other groups.
 
-    The fits start ``near`` the parameters of the fit to all readings.
+    The fits start ``near`` the parameters of the fit to all readings. ``tick`` is called with 1 after each fit.
     """
     if law.has_prior:
         return _left_out_of_model(law, readings)
@@ -58,6 +62,7 @@ def cross_validate(law: CandidateLaw, readings: FrictionReadings, near: Paramete
     for out, (others, left_out) in zip(readings.groups, readings.splits, strict=True):
         values, predicted[out], deviation[out] = predict(law, others, left_out, near)
         each.append(values)
+        tick(1)
     return CrossValidation(predicted, deviation, group_losses(readings, deviation), tuple(each))
 
 
@@ -171,19 +176,22 @@ def deviations_in_std(
     tested: FrictionReadings,
     near: ParameterValues,
     in_addition: float = 0.0,
+    tick: Ticks = lambda _: None,
 ) -> FloatArray:
     """Deviations of ``tested`` over the standard deviation of a band that is made from ``trained`` alone [-], (n,).
 
     The band comes from the groups of ``trained``, each left out in turn. ``in_addition`` is as of
     `prediction_uncertainty`.
     """
-    inner = cross_validate(law, trained, near)
+    inner = cross_validate(law, trained, near, tick)
     band = prediction_uncertainty(inner.predicted, inner.deviation, len(trained.groups), in_addition)
     _, friction, deviation = predict(law, trained, tested, near)
     return np.asarray(np.abs(deviation) / np.maximum(band.std(friction), 1e-12))
 
 
-def deviations_of_left_out(law: CandidateLaw, readings: FrictionReadings, near: ParameterValues) -> FloatArray:
+def deviations_of_left_out(
+    law: CandidateLaw, readings: FrictionReadings, near: ParameterValues, tick: Ticks = lambda _: None
+) -> FloatArray:
     """Deviations of each group over the standard deviation of a band that was made without it [-], shape (n,).
 
     For each group, law and uncertainty come from the other groups alone, the uncertainty by leaving out each of those
@@ -192,5 +200,12 @@ def deviations_of_left_out(law: CandidateLaw, readings: FrictionReadings, near: 
     ratios = np.empty(readings.count)
     for out in readings.groups:
         trained = readings.taken(~out) if len(readings.groups) >= 3 else readings
-        ratios[out] = deviations_in_std(law, trained, readings.taken(out), near)
+        ratios[out] = deviations_in_std(law, trained, readings.taken(out), near, tick=tick)
     return ratios
+
+
+def band_coverage(
+    law: CandidateLaw, readings: FrictionReadings, near: ParameterValues, tick: Ticks = lambda _: None
+) -> float:
+    """Share of the readings inside a 95 % band that was made without them [-], as of `deviations_of_left_out`."""
+    return float(np.mean(deviations_of_left_out(law, readings, near, tick) <= BAND_95))

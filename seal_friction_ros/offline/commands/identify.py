@@ -32,7 +32,8 @@ def add_parser(commands: Any) -> None:
     cli.add_file(parser, '--seal', 'seals', 'seal file with the geometry of the ring')
     cli.add_options(parser, _WHAT_IS_KNOWN)
     cli.add_actuator(parser)
-    cli.add_workers(parser, 'sources')
+    cli.add_workers(parser, 'sources, and groups of readings that are left out,')
+    cli.add_shared(parser, '--work')
 
 
 def _chambers(text: str) -> tuple[str, ...]:
@@ -121,7 +122,8 @@ def run(arguments: argparse.Namespace) -> int:
     paths = [one for one in arguments.sources if isinstance(one, Path)]
     targets = [(path, SEAL_FILE) for path in files.values()]
     with checked_targets('identify', targets, paths, force=arguments.force):
-        found = identify(arguments.sources, options, arguments.out.stem, cli.workers_of(arguments))
+        workers = cli.workers_of(arguments)
+        found = identify(arguments.sources, options, arguments.out.stem, workers, arguments.work)
         written: dict[str, Any] = {'seal_file': arguments.out}
         if kinds['kinds']:
             written = {'seal_files': {kind: str(path) for kind, path in files.items()}}

@@ -5,14 +5,15 @@ number is rounded to six digits before another number is computed from it: the s
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.parameters import from_mapping
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
@@ -26,12 +27,15 @@ from seal_friction_ros.core.identification.calibration import calibration
 from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, SealKind, candidate_laws
 from seal_friction_ros.core.identification.force_correction import ForceCorrection, force_correction
 from seal_friction_ros.core.identification.friction_model import Told
+from seal_friction_ros.core.identification.prepare_readings import with_predictable_groups
 from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
 from seal_friction_ros.core.identification.selection import (
     WORTHWHILE,
+    ChosenAnew,
     LawScore,
+    LeftOut,
     NotScored,
-    Ticks,
+    choose_anew,
     collinear_spread,
     recommended,
     rises_over_pressures,
@@ -56,6 +60,7 @@ from seal_friction_ros.offline.identification.results import (
 from seal_friction_ros.offline.identification.sources import SourceOptions, Sources, read_sources
 from seal_friction_ros.offline.identification.wording import kinds_warnings, remarks_on, warnings_of
 from seal_friction_ros.offline.work.executor import Workers
+from seal_friction_ros.offline.work.finished_parts import Part, content_of, part_key, run_parts
 from seal_friction_ros.offline.work.places import Place
 from seal_friction_ros.offline.work.progress import progress
 from seal_friction_ros.offline.work.seal_writer import rounded_numbers
@@ -83,21 +88,24 @@ class IdentifyOptions:
     name: str = ''  # of the seal; empty: the name of the seal file
 
 
-def identify(paths: Sequence[Place], options: IdentifyOptions, name: str, workers: Workers = 1) -> Identification:
+def identify(
+    paths: Sequence[Place], options: IdentifyOptions, name: str, workers: Workers = 1, work: Path | None = None
+) -> Identification:
     """Read bags, logs, tables or data sheets, fit every law, select one and assess it.
 
-    ValueError: the cluster cannot be used, the data are unfit for identification, or no law predicts
+    ValueError: the folder or the cluster cannot be used, the data are unfit for identification, or no law predicts
     them; one line with the reason and what to measure instead.
 
     Args:
         paths: The sources, by path or URL.
         options: How.
         name: Of the seal, unless the options name it.
-        workers: Sources at a time, or a cluster; the result does not depend on it.
+        workers: Sources, and groups that are left out, at a time, or a cluster; the result does not depend on it.
+        work: Folder that keeps what was found without each group, so that an interrupted run resumes; None keeps none.
     """
     data = gather(paths, options, workers)
     elastic = identify_presliding(data.sources) if options.presliding else None
-    selection = select_law(data, options.law)
+    selection = select_law(data, options.law, workers, work)
     _check_one_seal(diagnostics.swept_logs_compared(data.used, selection.fit), options.refuse_changed)
     told = _told_apart(data, selection, options.largest_kind_error)
     quality = assess(data, selection, options.run_to_run, told)
@@ -230,8 +238,10 @@ def _candidates(readings: FrictionReadings, ring: Ring | None = None) -> tuple[C
     return candidate_laws(variation_of(readings), *(ring or ()))
 
 
-def select_law(data: IdentificationData, name: str | None) -> LawSelection:
-    """Fit and score every candidate law; select the recommended one, or the one called ``name``.
+def select_law(
+    data: IdentificationData, name: str | None, workers: Workers = 1, work: Path | None = None
+) -> LawSelection:
+    """Fit and score every candidate law; select the recommended one, or the one called ``name``; the rest as above.
 
     ValueError: no law could be fitted, the selected one predicts nothing, or there is no law of that name.
     """
@@ -260,6 +270,10 @@ def select_law(data: IdentificationData, name: str | None) -> LawSelection:
             f'{100.0 * selected.validation.error:.0f} % on left-out readings: measure more strokes at each pressure, '
             'in both directions, with a settled seal'
         )
+    anew = None
+    if name is None and not readings.are_samples:  # a swept log would take minutes
+        anew = _choose_anew(data, readings, workers, work)
+        anew = anew._replace(predicted=anew.predicted / share)
     fit, settled_law = selected.fit, None
     if settled is not None:
         fit, of_settled_seal = (fitting.fit(fit.law, each, fit.values) for each in (data.used, settled.readings))
@@ -273,11 +287,36 @@ def select_law(data: IdentificationData, name: str | None) -> LawSelection:
         is_no_run_in=is_no_run_in,
         validation=run_in.as_measured(selected.validation, share),
         reference=validation.plain_mean(data.used),
+        chosen_anew=anew,
     )
 
 
+def _choose_anew(
+    data: IdentificationData, readings: FrictionReadings, workers: Workers, work: Path | None
+) -> ChosenAnew:
+    """Prediction of each group by a law chosen without it; the groups are parts of the work."""
+    ring, has_fitted_load = data.ring, data.sources.has_fitted_load
+    known = content_of([readings, ring, has_fitted_load])
+
+    def run(calls: Sequence[Callable[[], LeftOut]]) -> list[LeftOut]:
+        """Results of the calls, one for each group, kept in the work folder."""
+        parts = [
+            Part(part_key('choose without', [known, content_of(out)]), LeftOut._fields, call)
+            for out, call in zip(readings.groups, calls, strict=True)
+        ]
+        return [LeftOut(**found) for found in run_parts('choose without', parts, workers, work)]
+
+    return choose_anew(readings, partial(_recommended, ring=ring, has_fitted_load=has_fitted_load), run)
+
+
+def _recommended(readings: FrictionReadings, ring: Ring | None, has_fitted_load: bool) -> LawScore:
+    """Recommended law for the readings that are left."""
+    scores = _scored(with_predictable_groups(readings), ring, has_fitted_load)
+    return recommended(scores, rises=rises_over_pressures(readings))
+
+
 def _scored(
-    readings: FrictionReadings, ring: Ring | None, has_fitted_load: bool, tick: Ticks = lambda _: None
+    readings: FrictionReadings, ring: Ring | None, has_fitted_load: bool, tick: validation.Ticks = lambda _: None
 ) -> tuple[LawScore | NotScored, ...]:
     variation = variation_of(readings)
     if has_fitted_load:  # asymmetry is not identifiable: the fitted load holds it
@@ -306,7 +345,8 @@ def assess(
         of_band = between.of_band
     unseen = collinear_spread(selection.scores, found, used) if told is None else told.unseen_std
     in_addition = math.hypot(of_band, unseen)
-    ratios = validation.deviations_of_left_out(selection.law, selection.readings, found.values)
+    with progress('test the band', groups * (groups - 1)) as advance:
+        coverage = validation.band_coverage(selection.law, selection.readings, found.values, advance)
     names = [parameter.name for parameter in selection.law.parameters]
     errors = validation.jackknife_errors(validation.table_of(left_out.values, names))
     return LawQuality(
@@ -316,7 +356,7 @@ def assess(
         changes=diagnostics.shared_levels(everything) + diagnostics.swept_logs_compared(used, found),
         told_apart=unseen,
         kinds=told,
-        coverage=float(np.mean(ratios <= BAND_95)),
+        coverage=coverage,
         calibration=calibration(selection.law, selection.readings, found.values, run_to_run),
         repeatability=diagnostics.repeatability(used, found.offsets),
         drifts=[] if used.are_samples else run_in.drifts(everything, offsets),
@@ -342,9 +382,13 @@ def _levels(
     fitted, std = fitted_readings(mounted, readings.chamber_pressures, readings.at.velocity)
     measured = readings.magnitudes(fitting.offsets_of(readings, fitted))
     is_mean = readings.are_samples or bool(readings.kinds)  # a condition of several kinds holds several speeds
-    predicted = data.used.level_means(selection.validation.predicted).tolist()
+    unseen = np.full((data.used.count, 2), np.nan)
+    unseen[:, 0] = selection.validation.predicted
+    if selection.chosen_anew is not None:
+        unseen[:, 1] = selection.chosen_anew.predicted
+    predicted = data.used.level_means(unseen).tolist()
     if data.outlier is not None:
-        predicted.insert(list(readings.levels).index(data.outlier.level), data.outlier.expected)
+        predicted.insert(list(readings.levels).index(data.outlier.level), [data.outlier.expected] * 2)
     return tuple(
         PressureLevel(
             pressure=float(readings.seal_pressure[inside].mean()),
@@ -353,12 +397,13 @@ def _levels(
             fitted=float(fitted[inside].mean()),
             std=float(std[inside].mean()),
             left_out=left_out,
+            left_out_nested=nested,
             offset=math.nan if readings.are_samples else readings.half_range(inside).offset,
             readings=int(inside.sum()),
             drift=float(np.mean([d.change for d in quality.drifts if d.level == level] or [math.nan])),
             is_used=not data.is_outlier(level),
         )
-        for (level, inside), left_out in zip(readings.levels.items(), predicted, strict=True)
+        for (level, inside), (left_out, nested) in zip(readings.levels.items(), predicted, strict=True)
     )
 
 

@@ -23,7 +23,7 @@ from seal_friction_ros.core.identification.readings import FrictionReadings, Pre
 from seal_friction_ros.core.identification.run_in import Drift, SettledLaw
 from seal_friction_ros.core.identification.runs import BetweenRuns
 from seal_friction_ros.core.identification.seal_kinds import ToldApart, proposed_conditions
-from seal_friction_ros.core.identification.selection import LawScore, NotScored, is_beaten, scored
+from seal_friction_ros.core.identification.selection import ChosenAnew, LawScore, NotScored, is_beaten, scored
 from seal_friction_ros.core.identification.signal_preparation import LEVEL_GAP, LEVEL_GAP_MIN
 from seal_friction_ros.core.identification.temperature import TemperatureFit
 from seal_friction_ros.core.identification.validation import (
@@ -85,6 +85,8 @@ class LawSelection:
     validation: CrossValidation  # of the readings as measured
     reference: CrossValidation | None
     """prediction by the mean of the other readings at the same pressure, without a law"""
+    chosen_anew: ChosenAnew | None
+    """prediction by laws chosen without each group; None for swept logs and for a law that the user names"""
 
     @property
     def law(self) -> CandidateLaw:
@@ -133,6 +135,7 @@ class PressureLevel(NamedTuple):
     fitted: float  # [N] all seals, by the law fitted to the readings as measured
     std: float  # [N] of a new reading, by that law
     left_out: float  # [N] prediction by the law fitted without these readings; they had a say in its choice
+    left_out_nested: float  # [N] prediction by a law chosen and fitted without these readings; NaN if not done
     offset: float  # [N] of the force sum
     readings: int
     drift: float  # [-] relative change of the friction over the run; NaN if unknown
@@ -406,6 +409,8 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
             'std_N': [level.std for level in levels],
             'left_out_N': [level.left_out for level in levels],
             'worst_left_out_error': worst_left_out(levels),
+            'left_out_nested_N': [level.left_out_nested for level in levels],
+            'left_out_nested_laws': selection.chosen_anew and selection.chosen_anew.laws,
             'cross_validation_mean_deviation_N': selection.validation.mean_deviation,
             'ladder': [_ladder_row(score, selection) for score in selection.scores],
             'plain_mean_deviation_N': reference and reference.mean_deviation,

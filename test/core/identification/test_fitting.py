@@ -25,6 +25,7 @@ from seal_friction_ros.core.identification.fitting import fit
 from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.runs import PRIOR_STD, between_runs
 from seal_friction_ros.core.identification.selection import (
+    choose_anew,
     is_beaten,
     recommended,
     rises_over_pressures,
@@ -32,8 +33,8 @@ from seal_friction_ros.core.identification.selection import (
     score_laws,
 )
 from seal_friction_ros.core.identification.validation import (
+    band_coverage,
     cross_validate,
-    deviations_of_left_out,
     jackknife_errors,
     plain_mean,
     prediction_uncertainty,
@@ -265,7 +266,7 @@ def test_band_coverage_is_that_of_readings_that_neither_law_nor_band_had_seen():
     shares = []
     for seed in range(10):
         readings = noted(scatter=0.08, seed=seed)
-        shares.append(np.mean(deviations_of_left_out(LAW, readings, fit(LAW, readings).values) <= BAND_95))
+        shares.append(band_coverage(LAW, readings, fit(LAW, readings).values))
     assert 0.92 <= np.mean(shares) <= 0.99
 
 
@@ -460,6 +461,22 @@ def test_sources_that_disagree_at_a_pressure_are_named():
     assert (change.name, change.other_name) == ('a', 'b')
     assert change.ratio == change.other_friction / change.friction == pytest.approx(1.5)
     assert not shared_levels(one)
+
+
+def test_a_law_chosen_anew_for_a_group_has_not_seen_it():
+    readings = noted(scatter=0.02, pressures=5)
+    laws = [LAWS['constant_coulomb'], ELASTIC]
+
+    def choose(left):
+        return recommended(score_laws(laws, left))
+
+    found = choose_anew(readings, choose)
+    assert found.laws == ('pressure_power_law_2_3',) * 3
+    first = readings.group == 0
+    wild = FrictionReadings(**{**vars(noted(scatter=0.02, pressures=5)), 'force': readings.force * (1.0 + 9.0 * first)})
+    again = choose_anew(wild, choose)
+    assert again.predicted[first] == pytest.approx(found.predicted[first], rel=1e-12)
+    assert again.predicted[~first].mean() > 2.0 * found.predicted[~first].mean()
 
 
 # --- breakaway ---

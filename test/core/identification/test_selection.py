@@ -17,6 +17,8 @@ from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.selection import (
     LawScore,
     NotScored,
+    choose_anew,
+    choose_without,
     collinear_spread,
     recommended,
     regroupings,
@@ -173,6 +175,16 @@ def test_without_any_fit_there_is_no_recommendation_but_the_reasons():
         recommended([NotScored(LAWS[CONSTANT], 'too few'), NotScored(LAWS[FREE], 'bad')])
 
 
+def test_a_group_for_which_no_law_can_be_chosen_has_no_prediction():
+    def none(_):
+        raise ValueError('no law')
+
+    made = readings([10, 20, 40])
+    found = choose_without(made, made.level == 1, none)
+    assert found.law == ''
+    assert np.isnan(found.predicted).tolist() == [True, True]
+
+
 def test_a_swept_log_is_left_out_by_thirds_of_speed_and_pressure_and_by_files():
     made = readings(np.linspace(0.0, 90.0, 30), np.linspace(0.01, 0.1, 30), sources=2, samples=True)
     cells, files = regroupings(made)
@@ -268,6 +280,26 @@ def test_the_best_sound_law_that_depends_on_pressure_is_tried_again_with_speeds(
     assert isinstance(score_laws([chosen[1]], by_test)[0], LawScore)  # each test has both pressures
     (broken,) = score_laws([chosen[0]], replace(made, force=np.full(made.count, np.nan)))
     assert broken.why_not
+
+
+def test_groups_may_be_computed_by_another_and_stay_in_order():
+    made = readings([10, 20, 40], count=2, force=np.repeat([10.0, 20.0, 30.0], 4))
+    calls = []
+
+    def run(tasks):
+        calls.append(len(tasks))
+        return [task() for task in tasks]
+
+    def choose(left):
+        return recommended(score_laws([LAWS[CONSTANT]], left))
+
+    found = choose_anew(made, choose, run)
+    assert calls == [3]
+    assert found.laws == (CONSTANT,) * 3
+    # The friction of the others, each weighted with 1 / friction^2: sum of 1/f over sum of 1/f^2.
+    others = [(20.0, 30.0), (10.0, 30.0), (10.0, 20.0)]
+    expected = [sum(1.0 / f for f in pair) / sum(1.0 / f**2 for f in pair) for pair in others]
+    assert found.predicted == pytest.approx(np.repeat(expected, 4))
 
 
 # --- what speed and pressure cannot tell ---

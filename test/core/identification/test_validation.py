@@ -11,6 +11,7 @@ from seal_friction_ros.core.identification.fitting import fit
 from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.validation import (
     PredictionUncertainty,
+    band_coverage,
     cross_validate,
     deviations_in_std,
     deviations_of_left_out,
@@ -49,8 +50,8 @@ def test_a_run_that_was_left_out_gets_its_offset_from_its_own_two_directions():
 
 
 def test_each_group_is_predicted_by_the_others_and_counted():
-    readings = runs([20.0, 22.0, 30.0], [3.0, -2.0, 5.0])
-    found = cross_validate(CONSTANT, readings, {LEVEL: 10.0})
+    readings, ticks = runs([20.0, 22.0, 30.0], [3.0, -2.0, 5.0]), []
+    found = cross_validate(CONSTANT, readings, {LEVEL: 10.0}, ticks.append)
     expected = np.array([26.0, 25.0, 21.0])  # all readings at one pressure weigh the same
     assert found.predicted == pytest.approx(np.repeat(expected, 4))
     assert found.deviation == pytest.approx(np.repeat([-6.0, -3.0, 9.0], 4))
@@ -58,6 +59,7 @@ def test_each_group_is_predicted_by_the_others_and_counted():
     scale = 24.0  # [N] mean friction of the three
     assert found.losses == pytest.approx(np.array([6.0, 3.0, 9.0]) / scale)
     assert group_losses(readings, np.tile([1.0, -7.0], 6)) == pytest.approx(np.full(3, 5.0 / scale))
+    assert ticks == [1, 1, 1]
     assert found.rms == pytest.approx(np.sqrt((36.0 + 9.0 + 81.0) / 3.0))
     assert found.error == pytest.approx(18.0 / 72.0)
     assert found.mean_deviation == pytest.approx(6.0)
@@ -99,12 +101,16 @@ def test_the_band_of_a_group_is_made_from_the_others_and_that_of_two_groups_from
         assert found[out] == pytest.approx(one)
     # Of runs of 20 and 22 N each is off by 2 N from the other: 2 N and half as much more in square hold 95 %.
     assert found[readings.source == 2] == pytest.approx(np.full(4, 9.0 / (2.0 / BAND_95 * np.sqrt(1.5))), rel=0.1)
+    assert band_coverage(CONSTANT, readings, values) == np.mean(found <= BAND_95)
     two = readings.taken(readings.source < 2)
     both = deviations_of_left_out(CONSTANT, two, values)
     std = 2.0 / BAND_95 * np.sqrt(1.5)
     assert both == pytest.approx(np.full(8, 1.0 / std), rel=0.1)
     added = deviations_in_std(CONSTANT, two, readings.taken(readings.source == 2), values, 0.5)
     assert added == pytest.approx(np.full(4, 9.0 / np.hypot(std, 0.5 * 21.0)), rel=0.05)
+    ticks = []
+    deviations_of_left_out(CONSTANT, readings, values, ticks.append)
+    assert ticks == [1] * 6  # of each group both others
 
 
 def test_the_offset_of_a_run_is_told_whatever_pressures_its_directions_have():

@@ -10,17 +10,8 @@ from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import LBF, PSI
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.seal_file import parse_seal
-from seal_friction_ros.core.identification.candidate_laws import candidate_laws
 from seal_friction_ros.core.identification.fitting import offsets_of, root_mean_square
-from seal_friction_ros.core.identification.prepare_readings import with_predictable_groups
-from seal_friction_ros.core.identification.selection import (
-    NEAR,
-    recommended,
-    rises_over_pressures,
-    score_ladder,
-    variation_of,
-)
-from seal_friction_ros.core.identification.validation import predict
+from seal_friction_ros.core.identification.selection import NEAR
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.bags.import_log import read_samples
 from seal_friction_ros.offline.bags.import_thesis import import_thesis
@@ -210,23 +201,23 @@ def test_delft_a_left_out_pressure_is_predicted_within_12_percent(seal, run_of):
     assert np.abs(off[used]).max() <= 0.12
     assert run.figures['fitted_N'] == sorted(run.figures['fitted_N'])
     assert run.figures['fitted_N'][-1] > 1.3 * run.figures['fitted_N'][0]
-
-
-@pytest.mark.parametrize('seal', [*DELFT, 'O-ring257_run2'])
-def test_delft_a_left_out_pressure_is_predicted_by_a_law_that_is_chosen_without_it_too(seal):
-    bars = range(1, 6) if seal == 'Stadium_lc' else BARS
-    readings = select_law(
-        gather([data(f'delft/{seal}_{bar}bar.csv') for bar in bars], IdentifyOptions()), None
-    ).readings
+    nested = np.array(run.figures['left_out_nested_N']) / np.array(run.figures['measured_N']) - 1.0
     worst = {'X-ring257': 0.22, 'O-ring257_run2': 0.2}  # X-ring: two pressures are left of three, a prior stands in
-    for out in readings.groups:
-        others = readings.without(out)
-        variation, rises = variation_of(others), rises_over_pressures(others)
-        chosen = recommended(
-            score_ladder(candidate_laws(variation), with_predictable_groups(others), variation), rises=rises
-        )
-        _, predicted, _ = predict(chosen.law, others, readings.taken(out), chosen.fit.values)
-        assert abs(predicted.mean() / readings.half_range(out).friction - 1.0) <= worst.get(seal, 0.15)
+    assert np.abs(nested[used]).max() <= worst.get(seal, 0.15)
+    same = np.array(run.figures['left_out_nested_laws']) == run.figures['law']
+    assert nested[used][same] == pytest.approx(off[used][same], abs=1e-6)
+
+
+def test_without_its_highest_pressure_another_law_is_chosen_and_the_nested_error_says_so(run_of):
+    run = run_of(*delft('O-ring257_run2'))
+    assert run.figures['law'].startswith('pressure_power_law')
+    assert run.figures['left_out_nested_laws'][3] == 'pressure_power_law_3_2'
+    off, nested = (
+        run.figures[key][3] / run.figures['measured_N'][3] - 1.0 for key in ('left_out_N', 'left_out_nested_N')
+    )
+    assert nested > off + 0.05
+    named = run_of(*delft('O-ring257_run2'), '--law', run.figures['law'])
+    assert named.figures['left_out_nested_N'] == [None] * 4  # nothing was chosen
 
 
 @pytest.mark.parametrize(('higher', 'code'), [((1,), 0), ((1, 3, 5), 2)])
@@ -300,6 +291,7 @@ def test_the_number_of_workers_changes_no_byte(tmp_path):
         (folder := tmp_path / workers).mkdir()
         run = Run(folder, table, '--workers', workers, '--name', 'seal')
         assert run.code == 0, run.errors
+        assert all(run.figures['left_out_nested_laws'])
         files.append([path.read_bytes() for path in sorted(folder.glob('*.yaml'))])
     assert files[0] == files[1] != []
 

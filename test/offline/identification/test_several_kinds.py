@@ -190,9 +190,9 @@ def test_equal_kinds_of_names_and_options_of_one_kind_are_refused(tmp_path):
 
 
 def test_options_of_one_kind_are_taken_for_several_and_change_nothing_where_they_ask_for_what_is(tmp_path):
-    log = write_log(tmp_path, held(GRID[::2], rng()))
+    log, work = write_log(tmp_path, held(GRID[::2], rng())), tmp_path / 'work'
     plain = Run(tmp_path, *log, *KINDS, name='plain')
-    more = ('--law', 'all_terms', '--refuse-changed', '--workers', '2')
+    more = ('--law', 'all_terms', '--refuse-changed', '--workers', '2', '--work', str(work))
     asked = Run(tmp_path, *log, *KINDS, *more, name='asked')
     assert asked.code == 0, asked.errors
     assert asked.figures['kinds'] == plain.figures['kinds']
