@@ -7,14 +7,15 @@ pressure on its face, and the gap follows linearly about that state,
 
 with gap g_0 and pressure q_0 of the dry ring, and the compliance K of `elasticity.condensed_body`. The film reaches a
 quarter of the contact width beyond both edges of the contact, as far as the elements that face the wall do (our
-choice).
+choice). Under a high pressure that is the wall of the groove, where the face turns away from one node to the next; the
+interpolation of Akima follows that without overshoot.
 """
 
 import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.interpolate import Akima1DInterpolator, PchipInterpolator
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.lubrication.contact import ContactState, LubricatedContact, dry_contact
@@ -56,7 +57,7 @@ def oring_film(case: LubricationCase, oring: OringCase, pressure: float) -> Orin
     circumference = math.pi * (geometry.rod_diameter if on_rod else geometry.gland_diameter)
     modulus = 4.0 / 3.0 * oring.rubber.elastic_modulus  # E / (1 - 1/4)
     body = condensed_body(place, face.place, face.compliance, modulus, circumference)
-    dry_gap: FloatArray = CubicSpline(face.place, face.gap)(place)
+    dry_gap: FloatArray = Akima1DInterpolator(face.place, face.gap)(place)
     dry_pressure: FloatArray = PchipInterpolator(face.place, face.pressure)(place)
     ambient = np.where(np.arange(cells) < int(dry_pressure.argmax()), pressure, 0.0)
     contact = LubricatedContact(body, case.topography, case.grease)
