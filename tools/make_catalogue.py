@@ -30,12 +30,13 @@ COMPUTED = 'Computed, no reading: friction within a factor of 3.'
 SHAPES = {'o_ring': 'O-ring', 'x_ring': 'X-ring'}
 OTHERS: list[dict[str, Any]] = [
     {'name': f'u_cup_{rod}_rod', 'what': 'U-cup of polyurethane, Shore A 93', 'rod': rod, 'gland': rod + 10,
-     'height': 5.7, 'groove': 10.0, 'section': {'shape': 'u_cup'}, 'sliding': 'rod', 'hardness': 93.0}
+     'height': 5.7, 'groove': 10.0, 'section': {'shape': 'u_cup'}, 'sliding': 'rod', 'hardness': 93.0,
+     'bar': (0, 50, 100, 150)}
     for rod in (36, 50)
 ] + [
     {'name': 'capped_ring_50_bore', 'what': 'PTFE cap on a ring of nitrile, Shore A 70', 'rod': 39.0, 'gland': 50.0,
      'height': 5.9, 'groove': 7.5, 'section': {'shape': 'capped_ring', 'mirrored': True}, 'sliding': 'bore',
-     'hardness': 70.0},
+     'hardness': 70.0, 'bar': (0, 50, 100)},
 ]  # fmt: skip
 
 
@@ -79,7 +80,7 @@ def other_document(seal: dict[str, Any]) -> dict[str, Any]:
         'section': seal['section'],
         'groove': {'width': seal['groove'] * MM, 'diametral_clearance': 0.1 * MM},
         'rubber': {'hardness': seal['hardness']},
-        'pressures': [0.0, 50 * BAR, 100 * BAR],
+        'pressures': [pressure * BAR for pressure in seal['bar']],
     }
 
 

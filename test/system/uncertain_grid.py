@@ -14,6 +14,7 @@ from seal_friction_ros.core.lubrication.friction_map import map_pressures, stead
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, varied_case
 from seal_friction_ros.core.oring_contact.oring_case import OringCase
 from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case, varied_ring
+from seal_friction_ros.core.oring_contact.ring_friction import PRIOR, RingLaw
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.contact.lubrication_runs import compile_for_map
 from seal_friction_ros.offline.contact.sampling import coarse_case, coarse_ring, latin_hypercube, ring_forces
@@ -29,9 +30,9 @@ def map_forces(case: LubricationCase, values: Values) -> np.ndarray:
     return np.array([steady_friction(varied, pressure).friction for pressure in map_pressures(case.map)]).ravel()
 
 
-def dry_forces(case: OringCase, pressures: tuple[float, ...], values: Values) -> np.ndarray:
-    """Normal force of a dry ring with other values at its pressures [N]."""
-    return ring_forces(varied_ring(case, values), pressures).normal_force
+def dry_forces(case: OringCase, pressures: tuple[float, ...], law: RingLaw, values: Values) -> np.ndarray:
+    """Normal force and friction of a dry ring with other values at its pressures [N]."""
+    return np.concatenate(ring_forces(varied_ring(case, values), pressures, law))
 
 
 def compared(name: str, samples: int) -> np.ndarray:
@@ -46,7 +47,8 @@ def compared(name: str, samples: int) -> np.ndarray:
     else:
         file = parse_oring_case(read_yaml(config_path('oring', short)))
         unknowns = file.unknown
-        grids = tuple(partial(dry_forces, ring, file.pressures) for ring in (coarse_ring(file.case), file.case))
+        law = (file.friction or PRIOR).law
+        grids = tuple(partial(dry_forces, ring, file.pressures, law) for ring in (coarse_ring(file.case), file.case))
     names = [unknown.name for unknown in unknowns]
     drawn = [dict(zip(names, row, strict=True)) for row in latin_hypercube(unknowns, samples, 0).tolist()]
     found = try_all(name, [partial(grid, values) for grid in grids for values in ({}, *drawn)], available_cores())

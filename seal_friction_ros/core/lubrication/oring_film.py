@@ -7,7 +7,7 @@ pressure on its face, and the gap follows linearly about that state,
 
 with gap g_0 and pressure q_0 of the dry ring, and the compliance K of `elasticity.condensed_body`. The film reaches a
 quarter of the contact width beyond both edges of the contact, as far as the elements that face the wall do (our
-choice).
+choice). Under a high pressure that is the wall of the groove, where the face turns away from one node to the next.
 """
 
 import math
@@ -21,7 +21,7 @@ from seal_friction_ros.core.lubrication.contact import ContactState, LubricatedC
 from seal_friction_ros.core.lubrication.elasticity import condensed_body
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
 from seal_friction_ros.core.lubrication.model import LubricationModel
-from seal_friction_ros.core.oring_contact.compliance import sliding_face
+from seal_friction_ros.core.oring_contact.compliance import SlidingFace, sliding_face
 from seal_friction_ros.core.oring_contact.loading import loaded_states, oring_model
 from seal_friction_ros.core.oring_contact.oring_case import OringCase
 from seal_friction_ros.core.oring_contact.results import evaluate_contact
@@ -56,7 +56,7 @@ def oring_film(case: LubricationCase, oring: OringCase, pressure: float) -> Orin
     circumference = math.pi * (geometry.rod_diameter if on_rod else geometry.gland_diameter)
     modulus = 4.0 / 3.0 * oring.rubber.elastic_modulus  # E / (1 - 1/4)
     body = condensed_body(place, face.place, face.compliance, modulus, circumference)
-    dry_gap: FloatArray = CubicSpline(face.place, face.gap)(place)
+    dry_gap: FloatArray = _gap(face, place)
     dry_pressure: FloatArray = PchipInterpolator(face.place, face.pressure)(place)
     ambient = np.where(np.arange(cells) < int(dry_pressure.argmax()), pressure, 0.0)
     contact = LubricatedContact(body, case.topography, case.grease)
@@ -67,3 +67,13 @@ def oring_film(case: LubricationCase, oring: OringCase, pressure: float) -> Orin
     guess = np.maximum(dry_gap, 0.0) + length * np.log1p(stiffness / solid)
     gap = dry_contact(contact, model.profile + body.deflection(ambient), guess)
     return OringFilm(model, ContactState(gap, ambient, np.ones(cells)), face.axial_stiffness)
+
+
+def _gap(face: SlidingFace, place: FloatArray) -> FloatArray:
+    """Gap of the dry face [m]: a cubic spline, and linear from where it is steeper than 45 degrees: no overshoot."""
+    steep, peak = np.flatnonzero(np.abs(np.diff(face.gap)) > np.diff(face.place)), int(face.pressure.argmax())
+    first, last = max(steep[steep < peak] + 1, default=0), min(steep[steep >= peak], default=len(face.gap) - 1)
+    gap = np.interp(place, face.place, face.gap)
+    smooth = (place >= face.place[first]) & (place <= face.place[last])
+    gap[smooth] = CubicSpline(face.place[first : last + 1], face.gap[first : last + 1])(place[smooth])
+    return gap

@@ -41,7 +41,7 @@ class SlidingFace(NamedTuple):
 
     place: FloatArray  # z [m], shape (m,)
     gap: FloatArray  # to the wall [m]; negative by the penetration that the penalty allows, shape (m,)
-    pressure: FloatArray  # on the ring, of fluid and contact together [Pa], shape (m,)
+    pressure: FloatArray  # on the ring, of fluid and sliding wall together [Pa], shape (m,)
     compliance: FloatArray  # displacement off the wall by a force off it on a node, all round [m/N], shape (m, m)
     axial_stiffness: float  # axial force on the contact over its mean axial displacement [N/m]
 
@@ -85,7 +85,7 @@ def sliding_face(model: OringModel, loaded: LoadedRing, wall: int) -> SlidingFac
     return SlidingFace(
         place=position[facing, 1],
         gap=inward * (position[facing, 0] - radius),
-        pressure=there.total[facing],
+        pressure=there.total[facing] * (there.shares[facing, 0] + shares[facing, wall]),
         compliance=compliance,
         axial_stiffness=axial_stiffness,
     )

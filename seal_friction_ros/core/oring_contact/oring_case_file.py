@@ -10,7 +10,7 @@ Example; docs/oring.md describes every field::
     rubber: {hardness: 70.0}            # or elastic_modulus [Pa]; mooney_ratio, bulk_modulus
     pressures: [0.0, 3.4e+6, 6.9e+6]    # [Pa, gauge]
     friction:                           # optional: without it --reading or a prior
-      contact_shear: {shear_stress: 0.25e6, exponent: 0.333}   # or friction_coefficient, as in a seal file
+      contact_shear: {shear_stress: 0.1e6, knee_stress: 0.26e6}   # or friction_coefficient, as in a seal file
       stiction_ratio: 0.13
       uncertainty: {relative_std: 0.2}
     measured: {seals: 2, pressures: [...], frictions: [...], source: ...}   # optional: for comparison

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial.legendre import leggauss
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
-from seal_friction_ros.core.friction.laws.contact_shear import REFERENCE_STRESS
 from seal_friction_ros.core.oring_contact import surroundings as walls
 from seal_friction_ros.core.oring_contact.elements import deformation_gradient, volume_ratios
 from seal_friction_ros.core.oring_contact.equilibrium import OringModel, outline
@@ -14,6 +14,8 @@ from seal_friction_ros.core.oring_contact.loading import LoadedRing, loaded_stat
 from seal_friction_ros.core.oring_contact.material import von_mises_stress
 from seal_friction_ros.core.oring_contact.oring_case import OringCase
 
+_SHARES, _WEIGHTS = (0.5 * (values + shift) for values, shift in zip(leggauss(5), (1.0, 0.0), strict=True))
+"""Points and weights of a quadrature by Gauss and Legendre from 0 to 1."""
 _TOUCHING = 20.0  # distance from a wall, in transitions, beyond which the contact stress is negligible
 
 
@@ -36,19 +38,22 @@ class WallContact(NamedTuple):
         """Contact width [m]."""
         return self.edges[1] - self.edges[0] - self.between_lips
 
-    def sheared_area(self, exponent: float) -> float:
-        r"""Area of the contact weighted by its stress [m^2]: :math:`A_n = \int (\sigma / 1\,\mathrm{MPa})^n\,dA`.
+    def sheared_area(self, knee_stress: float) -> float:
+        r"""Area that the tau_0 of a `ShearLaw` acts on [m^2]: :math:`A = \int arsinh(\sigma / \sigma_0)\,dA`.
 
-        A shear stress tau = c (sigma / 1 MPa)^n has the friction c A_n. The square of the stress is linear between the
-        nodes and the edges, as at the edge of Hertz (our choice). All stress is scaled so that A_1 is the normal force
-        over 1 MPa: the step at the edge of the fluid is not in the profile.
+        The square of the stress is linear between the nodes and the edges, as at the edge of Hertz (our choice). All
+        stress is scaled so that its integral is the normal force: the step at the edge of the fluid is not in the
+        profile.
         """
         if not len(self.position):
             return 0.0
         place = np.concatenate(([self.edges[0]], self.position, [self.edges[1]]))
-        stress = np.concatenate(([0.0], self.stress, [0.0])) / REFERENCE_STRESS
-        scale = self.force / REFERENCE_STRESS / (self.circumference * _power_integral(place, stress, 1.0))
-        return self.circumference * _power_integral(place, scale * stress, exponent)
+        ends = np.sort(np.stack((np.r_[0.0, self.stress], np.r_[self.stress, 0.0])), axis=0)  # of each part
+        stress = ends[0] + np.multiply.outer(_SHARES, ends[1] - ends[0])
+        area = np.diff(place) * np.multiply.outer(_WEIGHTS, np.ones(len(place) - 1))
+        area *= self.circumference * 2.0 * stress / np.maximum(ends.sum(axis=0), np.finfo(float).tiny)
+        stress *= self.force / float((stress * area).sum())
+        return float((np.arcsinh(stress / knee_stress) * area).sum())
 
 
 class DeformedSection(NamedTuple):
@@ -171,16 +176,6 @@ def _contact(loaded: LoadedRing, position: FloatArray, wall: int) -> WallContact
         2.0 * np.pi * float(position[inside, 0].mean()),
         gaps,
     )
-
-
-def _power_integral(place: FloatArray, value: FloatArray, exponent: float) -> float:
-    """Integral of ``value ** exponent`` over ``place``, the square of the value linear between the points."""
-    low, high = np.sort(np.stack((value[:-1], value[1:])) ** 2, axis=0)
-    power, rise = 0.5 * exponent + 1.0, high - low
-    flat = rise <= 1e-9 * high  # where the quotient of differences would round
-    mean = (high**power - low**power) / (power * np.where(flat, 1.0, rise))
-    mean = np.where(flat, high ** (0.5 * exponent), mean)
-    return float(np.where(high > 0.0, mean, 0.0) @ np.diff(place))
 
 
 def _inside_corners(along: FloatArray, lip: IntArray, edges: tuple[float, float]) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.friction.actuator import Seal, Uncertainty
 from seal_friction_ros.core.friction.geometry import SealGeometry
-from seal_friction_ros.core.friction.laws.contact_shear import ContactShear, ShearLaw
+from seal_friction_ros.core.friction.laws.contact_shear import HIGHEST_KNEE, LOWEST_KNEE, ContactShear, ShearLaw
 from seal_friction_ros.core.friction.laws.friction_coefficient import FrictionCoefficientLaw
 from seal_friction_ros.core.friction.laws.law import FrictionLaw
 from seal_friction_ros.core.friction.laws.normal_force import NormalForceTable
@@ -20,9 +20,10 @@ from seal_friction_ros.core.oring_contact.results import WallContact
 
 ONE_READING_STD = 0.15  # [-] scatter of readings: the same ring mounted anew differs by 0.10 to 0.15
 READINGS_OF_SCATTER = 4.0  # readings that `ONE_READING_STD` counts as, beside the scatter that is found (our choice)
-EXPONENT_STD = 0.1  # [-] of the exponent about that of the prior law (our choice)
+KNEE_STD = 0.7  # [-] of the logarithm of the knee about that of the prior law: a factor of 2 (our choice)
 NO_READING_STD = 2.0  # [-] a factor of 3: the law of one ring is that far off on one of other rubber, wall, lubricant
 DISCRETISATION = 0.03  # [-] of the friction: what counts as an error of mesh and grid (our choice)
+_MOST_CHANGE = 4.0 * KNEE_STD
 BEYOND = 1.1  # share of the last computed pressure up to which a reading may lie
 
 RingLaw = FrictionCoefficientLaw | ShearLaw
@@ -38,7 +39,8 @@ class SealFriction:
     stiction_ratio: float = 0.0  # [-]
 
 
-PRIOR_LAW = ShearLaw(shear_stress=0.25e6, exponent=1.0 / 3.0)
+PRIOR_LAW = ShearLaw(shear_stress=0.1e6, knee_stress=0.26e6)
+"""Shear stress of the ring of the thesis; knee: geometric mean of that of its readings and of eight logs of Delft."""
 PRIOR = SealFriction(PRIOR_LAW, Uncertainty(NO_READING_STD), stiction_ratio=0.13)
 """Friction of a ring without any reading: shear law and breakaway ratio of the ring of the thesis."""
 
@@ -62,7 +64,7 @@ class FittedShear(NamedTuple):
 def friction_of_contact(law: RingLaw, contact: WallContact) -> float:
     """Sliding friction of a contact [N]: the integral of the shear stress, or mu(F_n) F_n."""
     if isinstance(law, ShearLaw):
-        return law.shear_stress * contact.sheared_area(law.exponent)
+        return law.shear_stress * contact.sheared_area(law.knee_stress)
     return law.coefficient_of_friction(contact.force) * contact.force
 
 
@@ -75,16 +77,16 @@ def friction_law(
     """
     at = tuple(pressures)
     if isinstance(law, ShearLaw):
-        return ContactShear(law.shear_stress, law.exponent, at, sheared_areas(at, contacts, law.exponent))
+        return ContactShear(law.shear_stress, law.knee_stress, at, sheared_areas(at, contacts, law.knee_stress))
     return PhysicsBased(geometry, NormalForceTable(at, tuple(contact.force for contact in contacts)), law)
 
 
-def sheared_areas(pressures: Sequence[float], contacts: Sequence[WallContact], exponent: float) -> tuple[float, ...]:
+def sheared_areas(pressures: Sequence[float], contacts: Sequence[WallContact], knee_stress: float) -> tuple[float, ...]:
     """`WallContact.sheared_area` over the pressure [Pa, gauge] without falls of `DISCRETISATION` or less [m^2].
 
     Rubber under more pressure does not rub less. ValueError: it falls by more.
     """
-    areas = np.array([contact.sheared_area(exponent) for contact in contacts])
+    areas = np.array([contact.sheared_area(knee_stress) for contact in contacts])
     highest = np.maximum.accumulate(areas)
     share = areas / np.maximum(highest, np.finfo(float).tiny)
     least = int(share.argmin())
@@ -110,7 +112,7 @@ def friction_after(seal: Seal) -> SealFriction:
         )
     mean = float(np.mean([law.coulomb_friction(pressure) for pressure in law.pressures]))
     ratio = seal.stiction_ratio + seal.stiction / mean
-    shear = ShearLaw(seal.friction_scale * law.shear_stress, law.exponent)
+    shear = ShearLaw(seal.friction_scale * law.shear_stress, law.knee_stress)
     return SealFriction(shear, Uncertainty(NO_READING_STD), stiction_ratio=ratio)
 
 
@@ -119,17 +121,17 @@ def fit_shear_law(
 ) -> FittedShear:
     r"""Shear law of a ring from readings of its friction F_i at the pressures P_i.
 
-    c is the geometric mean of :math:`F_i / A_n(P_i)`, by the contacts on the sliding wall at the computed pressures
-    [Pa, gauge]. The exponent minimises
+    tau_0 is the geometric mean of :math:`F_i / A(P_i)`, by the contacts on the sliding wall at the computed
+    pressures [Pa, gauge]. The knee minimises
 
     .. math::
-        \sum_i \frac{(\ln F_i - \ln c A_n(P_i))^2}{s_0^2} + \frac{(n - n_0)^2}{s_n^2}
+        \sum_i \frac{(\ln F_i - \ln \tau_0 A(P_i))^2}{s_0^2} + \frac{(\ln \sigma_0 / \sigma_p)^2}{s_k^2}
 
-    with s_0 = `ONE_READING_STD`, s_n = `EXPONENT_STD` and n_0 of the prior, so that it moves only where readings tell.
+    with s_0 = `ONE_READING_STD`, s_k = `KNEE_STD` and sigma_p of the prior, so that it moves only where readings tell.
     The deviation that is left counts s_0 as `READINGS_OF_SCATTER` readings:
 
     .. math::
-        s^2 = \frac{k s_0^2 + \sum_i (\ln F_i - \ln c A_n(P_i))^2}{k + N - 1}
+        s^2 = \frac{k s_0^2 + \sum_i (\ln F_i - \ln \tau_0 A(P_i))^2}{k + N - 1}
 
     so one reading leaves s_0. The speed is not in the law. All this is our choice. ValueError: a reading is at a
     pressure that was not computed, or its friction is not positive.
@@ -144,18 +146,25 @@ def fit_shear_law(
             f'{pressures[-1]:g} Pa: give --pressures'
         )
 
-    def shear_stresses(exponent: float) -> FloatArray:
-        """Logarithm of friction over A_n of each reading."""
-        of_area = ContactShear(1.0, exponent, tuple(pressures), sheared_areas(pressures, contacts, exponent))
+    def stresses(knee_stress: float) -> FloatArray:
+        """Logarithm of friction over A of each reading."""
+        areas = sheared_areas(pressures, contacts, knee_stress)
+        of_area = ContactShear(1.0, knee_stress, tuple(pressures), areas)
         return np.log(friction / [of_area.coulomb_friction(p) for p in at.tolist()])
 
-    def cost(exponent: float) -> float:
-        scatter = np.var(shear_stresses(exponent)) * len(readings)
-        return float(scatter / ONE_READING_STD**2 + ((exponent - prior.exponent) / EXPONENT_STD) ** 2)
+    def knee(change: float) -> float:
+        """Of a change of its logarithm, within the bounds of the law."""
+        return min(max(prior.knee_stress * math.exp(change), LOWEST_KNEE), HIGHEST_KNEE)
 
-    n = round(float(minimize_scalar(cost, bounds=(0.0, 1.0), method='bounded').x), 4)
-    stresses = shear_stresses(n)
-    c = math.exp(stresses.mean())
-    left = float(((stresses - math.log(c)) ** 2).sum())
+    def cost(change: float) -> float:
+        """Of a change of the logarithm of the knee."""
+        scatter = np.var(stresses(knee(change))) * len(readings)
+        return float(scatter / ONE_READING_STD**2 + (change / KNEE_STD) ** 2)
+
+    change = float(minimize_scalar(cost, bounds=(-_MOST_CHANGE, _MOST_CHANGE), method='bounded').x)
+    knee_stress = knee(round(change, 4))
+    found = stresses(knee_stress)
+    shear_stress = math.exp(found.mean())
+    left = float(((found - math.log(shear_stress)) ** 2).sum())
     variance = (READINGS_OF_SCATTER * ONE_READING_STD**2 + left) / (READINGS_OF_SCATTER + len(readings) - 1.0)
-    return FittedShear(ShearLaw(c, n), math.sqrt(variance), c / np.exp(stresses) - 1.0)
+    return FittedShear(ShearLaw(shear_stress, knee_stress), math.sqrt(variance), shear_stress / np.exp(found) - 1.0)

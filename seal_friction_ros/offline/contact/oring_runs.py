@@ -62,8 +62,8 @@ class OringSummary:
     area_deformation_gain: float | None  # slope of normal over axial force by least squares; None with one pressure
     radial_force_N: float | None  # value of that line at zero axial force; None with one pressure
     friction_N: tuple[float, ...] | None  # sliding friction of one seal, if the case has a law for it
-    shear_stress_Pa: float | None  # of the contact at 1 MPa of contact stress; None without a shear law
-    shear_exponent: float | None
+    shear_stress_Pa: float | None  # of the shear law; None without one
+    knee_stress_Pa: float | None
     friction_relative_std: float | None
     reading_deviations: tuple[float, ...]  # friction of the law over each reading, less one
     film_out_m: tuple[float | None, ...]  # film of a smooth seal, see `SealFilm`; empty without a fluid
@@ -201,7 +201,7 @@ def _summary(
         radial_force_N=radial,
         friction_N=tuple(friction_of_contact(friction.law, contact) for contact in contacts) if friction else None,
         shear_stress_Pa=shear.shear_stress if shear else None,
-        shear_exponent=shear.exponent if shear else None,
+        knee_stress_Pa=shear.knee_stress if shear else None,
         friction_relative_std=friction.uncertainty.relative_std if friction else None,
         reading_deviations=deviations,
         film_out_m=tuple(film and film.out for film in films),

@@ -62,11 +62,11 @@ def uncertain_map(
 
 
 def coarse_case(case: LubricationCase) -> LubricationCase:
-    """The case on the grid of its samples: fewer cells, lines, speeds and pressures; the same ranges."""
+    """The case on the grid of its samples: fewer cells, speeds and pressures; the same ranges, and the same O-ring."""
     numerics = replace(case.numerics, cells=min(case.numerics.cells, MOST_CELLS))
     grid = case.map
     grid = replace(grid, velocities=min(grid.velocities, MOST_SPEEDS), pressures=min(grid.pressures, MOST_PRESSURES))
-    return replace(case, numerics=numerics, map=grid, oring=case.oring and coarse_ring(case.oring))
+    return replace(case, numerics=numerics, map=grid)
 
 
 def coarse_ring(case: OringCase) -> OringCase:

@@ -62,9 +62,8 @@ def _friction_text(computed: Computed, frictions: Sequence[float]) -> str:
     """Friction of one seal in one line, and how far it may be off."""
     summary = computed.summary
     text = f'  friction of one seal {", ".join(f"{friction:.3g}" for friction in frictions)} N'
-    if summary.shear_stress_Pa is not None:
-        stress = f'shear stress at 1 MPa {summary.shear_stress_Pa / MPA:.3g} MPa'
-        text += f', {stress}, exponent {summary.shear_exponent:.3g}'
+    if summary.shear_stress_Pa is not None and summary.knee_stress_Pa is not None:
+        text += f', shear stress {summary.shear_stress_Pa / MPA:.3g} MPa, knee {summary.knee_stress_Pa / MPA:.3g} MPa'
     text += f', relative_std {summary.friction_relative_std:.2g}'
     if computed.task.readings:
         largest = max(map(abs, summary.reading_deviations))

@@ -74,6 +74,15 @@ def test_film_reaches_no_farther_than_the_face_of_the_ring(sealed, monkeypatch):
     assert (model.place[0] - half, model.place[-1] + half) == pytest.approx(tuple(sealed.face.place[[0, -1]]))
 
 
+@pytest.mark.long
+def test_the_gap_of_a_fine_mesh_opens_up_to_the_wall_of_the_groove_where_the_face_turns_away():
+    """There the gap rises by 50 um from one node to the next."""
+    ring = dataclasses.replace(ring_on('rod'), numerics=OringNumerics(lines=65))
+    film = oring_film(case_of(ring), ring, 6.9e6)
+    assert film.start.gap.min() > 0.0
+    assert (np.diff(film.start.gap[-10:]) > 0.0).all()
+
+
 def test_film_goes_round_the_wall_that_slides_and_has_the_rubber_in_plane_strain(sealed):
     model = sealed.film.model
     diameter = {'rod': 15.875e-3, 'bore': 20.8534e-3}[sealed.ring.geometry.sliding_wall]

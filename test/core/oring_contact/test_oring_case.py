@@ -153,7 +153,7 @@ FRICTION = {
     'uncertainty': {'relative_std': 0.2},
 }
 SHEAR = {
-    'contact_shear': {'shear_stress': '0.2 MPa', 'exponent': 0.3},
+    'contact_shear': {'shear_stress': '0.1 MPa', 'knee_stress': '0.3 MPa'},
     'stiction_ratio': 0.1,
     'uncertainty': {'relative_std': 0.2},
 }
@@ -187,7 +187,7 @@ def test_case_file_has_the_friction_of_a_seal_file_and_what_was_measured():
 
 def test_case_file_may_have_a_shear_law_in_the_place_of_a_coefficient():
     friction = parse_oring_case(document(friction=SHEAR)).friction
-    assert friction.law == ShearLaw(2e5, 0.3)
+    assert friction.law == ShearLaw(1e5, 3e5)
     assert (friction.stiction, friction.stiction_ratio) == (0.0, 0.1)
 
 
@@ -205,10 +205,10 @@ def test_case_file_may_have_a_shear_law_in_the_place_of_a_coefficient():
         ({'friction': 0.2}, 'case mine: friction = 0.2 is not a mapping of contact_shear, friction_coefficient'),
         ({'friction': FRICTION | {'stick': 1.0}}, 'is not a mapping of contact_shear, friction_coefficient, stiction'),
         ({'friction': FRICTION | SHEAR}, 'give one of contact_shear and friction_coefficient; got friction_coeff'),
-        ({'friction': SHEAR | {'contact_shear': {'shear_stress': 2e5}}}, 'contact_shear lacks exponent'),
+        ({'friction': SHEAR | {'contact_shear': {'shear_stress': 2e5}}}, 'contact_shear lacks knee_stress'),
         (
-            {'friction': SHEAR | {'contact_shear': {'shear_stress': 2e5, 'exponent': 1.1}}},
-            'exponent = 1.1 1 is above its upper bound 1.0',
+            {'friction': SHEAR | {'contact_shear': {'shear_stress': 1e5, 'knee_stress': 0.3}}},
+            'knee_stress = 0.3 Pa is below its lower bound 1.0 Pa',
         ),
         ({'friction': FRICTION | {'stiction': -1.0}}, 'stiction = -1.0 N is below its lower bound 0.0 N'),
         ({'friction': FRICTION | {'stiction': 1.1e6}}, 'stiction = 1100000.0 N is above its upper bound 1000000.0 N'),

@@ -5,10 +5,11 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from seal_friction_ros.core.friction.actuator import Seal, Uncertainty
 from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
-from seal_friction_ros.core.friction.laws.contact_shear import ContactShear, ShearLaw
+from seal_friction_ros.core.friction.laws.contact_shear import HIGHEST_KNEE, ContactShear, ShearLaw
 from seal_friction_ros.core.friction.laws.friction_coefficient import PowerLaw
 from seal_friction_ros.core.oring_contact.oring_case import OringNumerics
 from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
@@ -38,35 +39,35 @@ def hertz(load: float, width: float, length: float = 0.05, nodes: int = 20) -> W
 CONTACTS = [hertz(20.0, 0.5e-3), hertz(120.0, 0.9e-3), hertz(230.0, 1.1e-3)]
 
 
-def test_a_constant_shear_stress_acts_on_the_area_and_a_constant_coefficient_on_the_normal_force():
+def test_under_a_high_knee_the_coefficient_is_constant_and_far_above_a_low_one_the_logarithm_acts_on_the_area():
     (contact, *_) = CONTACTS
-    assert friction_of_contact(ShearLaw(3e5, 0.0), contact) == pytest.approx(3e5 * 0.5e-3 * 0.05)
-    assert friction_of_contact(ShearLaw(3e5, 1.0), contact) == pytest.approx(0.3 * 20.0)
+    assert friction_of_contact(ShearLaw(3e11, 1e12), contact) == pytest.approx(0.3 * 20.0)
+    more = friction_of_contact(ShearLaw(3e5, 1.0), contact) - friction_of_contact(ShearLaw(3e5, 2.0), contact)
+    assert more == pytest.approx(3e5 * math.log(2.0) * 0.5e-3 * 0.05, rel=1e-6)
     assert friction_of_contact(PowerLaw(2.0, 0.5), contact) == pytest.approx(2.0 * 20.0**0.5)
 
 
-def test_the_integral_over_an_elliptic_stress_has_its_closed_form():
-    """Mean of (1 - x^2)^(n/2) over the width: sqrt(pi)/2 Gamma(n/2 + 1) / Gamma(n/2 + 3/2)."""
-    n = 1.0 / 3.0
+@pytest.mark.parametrize('knee', [1e4, 3e5, 1e7])
+def test_the_integral_over_an_elliptic_stress_is_exact(knee):
+    """Over the stress of Hertz, by adaptive quadrature."""
     contact = hertz(100.0, 1e-3)
-    mean = math.sqrt(math.pi) / 2.0 * math.gamma(n / 2.0 + 1.0) / math.gamma(n / 2.0 + 1.5)
-    exact = 1e-3 * 0.05 * (contact.peak_stress / 1e6) ** n * mean
-    assert contact.sheared_area(n) == pytest.approx(exact, rel=2e-3)
-    assert hertz(100.0, 1e-3, nodes=80).sheared_area(n) == pytest.approx(exact, rel=1e-4)
+    mean, _ = quad(lambda x: math.asinh(contact.peak_stress / knee * math.sqrt(1.0 - x * x)), 0.0, 1.0)
+    assert contact.sheared_area(knee) == pytest.approx(1e-3 * 0.05 * mean, rel=2e-3)
+    assert hertz(100.0, 1e-3, nodes=80).sheared_area(knee) == pytest.approx(1e-3 * 0.05 * mean, rel=1e-4)
 
 
 def test_a_contact_that_shrinks_by_less_than_the_error_of_the_mesh_has_a_law_and_one_that_shrinks_more_is_refused():
     geometry = parse_oring_case(read_yaml(config_path('oring', 'ms28775_114'))).case.geometry
-    law, first = ShearLaw(2.5e5, 1.0), hertz(100.0, 0.9e-3)
+    law, first = ShearLaw(0.25 * HIGHEST_KNEE, HIGHEST_KNEE), hertz(100.0, 0.9e-3)  # 0.25 of the stress
     level = friction_law(law, geometry, PRESSURES, [first, hertz(98.0, 0.9e-3), hertz(230.0, 1.1e-3)])
-    assert level.coulomb_friction(2e6) == level.coulomb_friction(0.0) == pytest.approx(25.0)
+    assert level.coulomb_friction(2e6) == level.coulomb_friction(0.0) == pytest.approx(25.0, rel=1e-3)
     with pytest.raises(ValueError, match='friction falls with pressure, at 2e\\+06 Pa by 4 %: the fluid passes a lip'):
         friction_law(law, geometry, PRESSURES, [first, hertz(96.0, 0.9e-3), hertz(230.0, 1.1e-3)])
 
 
 def test_the_law_of_a_seal_file_is_the_friction_of_each_contact():
     geometry = parse_oring_case(read_yaml(config_path('oring', 'ms28775_114'))).case.geometry
-    for law in (ShearLaw(2.5e5, 0.3), PowerLaw(2.0, 0.5)):
+    for law in (ShearLaw(1e5, 3e5), PowerLaw(2.0, 0.5)):
         made = friction_law(law, geometry, PRESSURES, CONTACTS)
         direct = [friction_of_contact(law, contact) for contact in CONTACTS]
         assert [made.coulomb_friction(p) for p in PRESSURES] == pytest.approx(direct)
@@ -78,21 +79,27 @@ def readings(law: ShearLaw, factors: tuple[float, ...] = (1.0, 1.0, 1.0)) -> lis
 
 
 @pytest.mark.parametrize('which', [0, 1, 2])
-def test_one_reading_fixes_the_factor_keeps_the_exponent_and_leaves_15_percent(which):
-    found = fit_shear_law(ShearLaw(1e4, 0.4), PRESSURES, CONTACTS, [readings(ShearLaw(6e4, 0.4))[which]])
+def test_one_reading_fixes_the_factor_keeps_the_knee_and_leaves_15_percent(which):
+    found = fit_shear_law(ShearLaw(1e4, 4e5), PRESSURES, CONTACTS, [readings(ShearLaw(6e4, 4e5))[which]])
     assert found.law.shear_stress == pytest.approx(6e4, rel=1e-3)
-    assert found.law.exponent == pytest.approx(0.4, abs=1e-3)
+    assert found.law.knee_stress == pytest.approx(4e5, rel=1e-3)
     assert found.relative_std == pytest.approx(ONE_READING_STD)
     assert found.deviations == pytest.approx([0.0])
 
 
-def test_many_readings_move_the_exponent_and_few_of_one_pressure_do_not():
-    truth = ShearLaw(6e4, 0.6)
+def test_many_readings_move_the_knee_and_few_of_one_pressure_do_not():
+    truth = ShearLaw(6e4, 1e6)
     many = fit_shear_law(PRIOR_LAW, PRESSURES, CONTACTS, 30 * readings(truth))
-    assert many.law.exponent == pytest.approx(0.6, abs=0.03)
+    assert many.law.knee_stress == pytest.approx(1e6, rel=0.05)
     assert many.relative_std < 0.05
     at_one = fit_shear_law(PRIOR_LAW, PRESSURES, CONTACTS, 5 * readings(truth)[:1])
-    assert at_one.law.exponent == pytest.approx(PRIOR_LAW.exponent, abs=1e-3)
+    assert at_one.law.knee_stress == pytest.approx(PRIOR_LAW.knee_stress, rel=1e-3)
+
+
+@pytest.mark.parametrize('knee', [1.0, 1e12])
+def test_the_knee_of_a_fit_stays_within_the_bounds_of_the_law(knee):
+    found = fit_shear_law(ShearLaw(1e5, knee), PRESSURES, CONTACTS, readings(PRIOR_LAW))
+    assert 1.0 <= found.law.knee_stress <= 1e12
 
 
 def test_readings_that_scatter_leave_their_scatter():
@@ -114,13 +121,13 @@ def test_a_reading_that_cannot_be_used_is_refused(reading, words):
 
 
 def test_another_ring_of_the_same_seal_has_its_shear_law_its_breakaway_ratio_and_a_factor_of_three():
-    law = ContactShear(2e5, 0.3, (0.0, 1e6), (1e-5, 3e-5))
+    law = ContactShear(2e5, 3e5, (0.0, 1e6), (1e-5, 3e-5))
     seal = Seal(
         name='mine', coulomb_law=law, uncertainty=Uncertainty(0.1), stiction=1.0, stiction_ratio=0.1,
         friction_scale=1.5, pressure_max=1e6,
     )  # fmt: skip
     found = friction_after(seal)
-    assert found.law == ShearLaw(3e5, 0.3)
+    assert found.law == ShearLaw(3e5, 3e5)
     assert found.stiction_ratio == pytest.approx(0.1 + 1.0 / 4.0)  # 2 N and 6 N
     assert found.uncertainty == Uncertainty(2.0)
     with pytest.raises(ValueError, match='its constant_coulomb is for its own size'):
@@ -143,8 +150,8 @@ def test_four_times_the_diameter_at_equal_stress_has_four_times_the_friction():
         oring_results(case, pressures), oring_results(dataclasses.replace(case, geometry=large), pressures), strict=True
     ):
         assert other.rod.peak_stress == pytest.approx(one.rod.peak_stress, rel=0.05)
-        for exponent in (0.0, 1.0 / 3.0, 1.0):
-            assert other.rod.sheared_area(exponent) == pytest.approx(4.0 * one.rod.sheared_area(exponent), rel=0.05)
+        for knee in (1e3, 3e5, 1e9):
+            assert other.rod.sheared_area(knee) == pytest.approx(4.0 * one.rod.sheared_area(knee), rel=0.05)
         by_force = PowerLaw(2.08, 0.562)
         assert friction_of_contact(by_force, other.rod) < 2.0 * friction_of_contact(by_force, one.rod)
-        assert one.rod.sheared_area(1.0) * 1e6 == pytest.approx(one.rod.force)
+        assert one.rod.sheared_area(1e12) * 1e12 == pytest.approx(one.rod.force)

@@ -1,6 +1,7 @@
 """Sections of any shape: outlines, meshes, and the contact that they have."""
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -171,7 +172,8 @@ def test_an_x_ring_seals_with_two_lips_on_each_wall():
         contact = evaluate_contact(oring_model(case), state).gland
         assert contact.between_lips > 1.0e-3
         assert 0.6e-3 < contact.width < 1.8e-3
-        assert contact.sheared_area(0.0) == pytest.approx(contact.width * contact.circumference, rel=1e-6)
+        touching = contact.sheared_area(1e-3) - contact.sheared_area(1e-3 * math.e)  # of the logarithm of all stress
+        assert touching == pytest.approx(contact.width * contact.circumference, rel=1e-3)
 
 
 def test_the_normal_force_of_an_x_ring_converges_on_three_meshes():
@@ -216,8 +218,8 @@ def test_a_section_that_folds_onto_itself_is_refused():
 def test_a_lip_that_touches_with_its_edge_alone_has_friction():
     contact = at(dataclasses.replace(seal('u_cup'), rubber=Rubber(elastic_modulus=20e6)), 0.0).gland
     assert 0.0 < contact.width < 0.3e-3
-    assert contact.sheared_area(1.0) == pytest.approx(contact.force / 1e6)
-    assert contact.sheared_area(0.0) > 0.0
+    assert 1e12 * contact.sheared_area(1e12) == pytest.approx(contact.force)
+    assert contact.sheared_area(1e5) > 0.0
 
 
 # -- exact solution: a block between smooth walls, squeezed by a tenth, in plane strain ------------------------------

@@ -1,6 +1,4 @@
-"""What one ring, or one reading, tells of the friction of another: the claims of docs/oring.md, on a coarser mesh."""
-
-import re
+"""What one ring, or one reading, tells of the friction of another: the claims of docs/oring.md."""
 
 import numpy as np
 import pytest
@@ -13,72 +11,114 @@ from harness.ring_transfer import (
     frictions_of_cycles,
     of_others,
     off,
+    other_tests_as_law,
+    own_law,
     ring_of,
     with_one_reading,
     without_reading,
 )
 from paths import ROOT
+from scipy.interpolate import PchipInterpolator
 
-THESIS_LINES, DELFT_LINES = 25, 33
+from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
+from seal_friction_ros.core.oring_contact.ring_friction import PRIOR_LAW
+from seal_friction_ros.files import config_path, read_yaml
 
 needs_delft = pytest.mark.skipif(not DELFT.exists(), reason=f'{DELFT} is not there')
 
 
 @pytest.fixture(scope='module')
 def thesis():
-    return ring_of('ms28775_114', THESIS_LINES)
+    return ring_of('ms28775_114_blind')
 
 
 @pytest.fixture(scope='module')
 def delft():
-    return ring_of('delft_o_ring', DELFT_LINES)
+    return ring_of('delft_o_ring')
 
 
-def test_the_shear_law_of_the_thesis_is_5_percent_off_its_readings_in_the_mean_and_most_at_100_psi(thesis):
-    found = off(thesis.predicted(fitted(thesis, thesis.readings)), thesis)
-    assert np.abs(found).mean() < 5.0
+@pytest.fixture(scope='module')
+def logs(delft):
+    if not DELFT.exists():
+        pytest.skip(f'{DELFT} is not there')
+    return delft._replace(readings=[delft_reading(DELFT / log) for log in LOGS])
+
+
+def beats_the_others(found):
+    """Whether the mean of the shear law is below that of mu N and of a constant."""
+    return found['shear law'].mean() < min(found['mu N'].mean(), found['constant'].mean())
+
+
+def test_the_shear_law_of_the_thesis_is_4_percent_off_its_readings_in_the_mean_and_most_at_100_psi(thesis):
+    found = off(thesis.predicted(own_law(thesis)), thesis)
+    assert np.abs(found).mean() < 4.0
     assert np.abs(found).argmax() == 1
-    assert np.abs(found).max() < 16.0
+    assert np.abs(found).max() < 13.0
 
 
-def test_without_a_reading_the_law_of_another_rubber_is_off_by_a_factor_of_three_or_more(thesis, delft):
+def test_without_a_reading_the_law_of_another_rubber_is_off_by_about_a_factor_of_three(thesis, delft):
     forward = without_reading(thesis, delft)['shear law']
     back = without_reading(delft, thesis)['shear law']
-    assert forward.min() > 200.0
-    assert back.max() < -67.0
+    assert 200.0 < forward.min() < forward.max() < 240.0
+    assert -75.0 < back.min() < back.max() < -60.0
 
 
-@pytest.mark.parametrize(('at', 'within'), [(1, 8.0), (0, 15.0), (2, 15.0), (3, 16.0)])
-def test_one_reading_of_delft_and_the_exponent_of_the_thesis_predict_the_other_pressures(thesis, delft, at, within):
-    found = with_one_reading(delft, fitted(thesis, thesis.readings))
-    assert np.abs(found['shear law'][at]).max() < within
-    assert np.abs(found['shear law']).mean() < np.abs(found['mu N']).mean() < np.abs(found['constant']).mean()
+def test_one_reading_of_delft_and_the_knee_of_the_thesis_predict_each_other_pressure_within_7_percent(thesis, delft):
+    found = with_one_reading(delft, own_law(thesis))
+    assert np.abs(found['shear law'][[0, 1, 3]]).max() < 7.0
+    assert np.abs(found['shear law']).max() < 7.5  # 1 bar from the reading at 5 bar
+    assert np.abs(found['mu N']).max() > 15.0
+    assert beats_the_others({model: of_others(values) for model, values in found.items()})
 
 
-def test_one_reading_of_the_thesis_at_300_psi_or_more_predicts_the_others_within_8_percent_in_the_mean(thesis, delft):
-    for prior in (fitted(delft, delft.readings), None):
-        found = with_one_reading(thesis, *([prior] if prior else []))
-        others = {model: of_others(values)[3:].mean(axis=1) for model, values in found.items()}
-        assert others['shear law'].max() < 8.0
-        assert (others['shear law'] < others['mu N']).all()
-        assert (others['shear law'] < others['constant']).all()
+def test_a_reading_of_the_thesis_and_the_knee_of_eight_logs_of_delft_predict_the_others_within_12_percent(thesis, logs):
+    found = {model: of_others(values) for model, values in with_one_reading(thesis, own_law(logs)).items()}
+    assert found['shear law'][1:].mean(axis=1).max() < 12.0  # from 100 psi on
+    assert beats_the_others(found)
 
 
-@needs_delft
-def test_one_log_of_delft_predicts_the_others_within_12_percent_in_the_mean_and_25_at_worst(delft):
-    logs = delft._replace(readings=[delft_reading(DELFT / log) for log in LOGS])
+def test_one_reading_of_the_thesis_at_200_psi_or_more_predicts_the_others_within_8_percent_in_the_mean(thesis):
+    found = {model: of_others(values)[2:].mean(axis=1) for model, values in with_one_reading(thesis).items()}
+    assert found['shear law'].max() < 8.0
+    assert (found['shear law'] < found['mu N']).all()
+    assert (found['shear law'] < found['constant']).all()
+
+
+def test_no_curve_through_the_other_readings_of_the_thesis_meets_that_at_100_psi(thesis):
+    pressures = np.array([reading.pressure for reading in thesis.readings])
+    others = np.arange(len(pressures)) != 1
+    curve = PchipInterpolator(pressures[others], thesis.frictions[others])
+    assert curve(pressures[1]) / thesis.frictions[1] == pytest.approx(0.89, abs=0.01)
+
+
+def test_two_of_the_three_tests_of_the_thesis_predict_the_third_hardly_better_than_the_law(thesis):
+    """After one reading at 100 psi or more, mean over the other pressures."""
+    found = [deviations[1:].mean(axis=1) for deviations in other_tests_as_law()]
+    assert max(means.max() for means in found) > 15.0
+    assert np.mean(found) > of_others(with_one_reading(thesis)['shear law'])[1:].mean()
+
+
+def test_one_log_of_delft_predicts_the_others_within_12_percent_in_the_mean_and_25_at_worst(logs):
     found = {model: of_others(values) for model, values in with_one_reading(logs).items()}
     assert found['shear law'].mean(axis=1).max() < 12.0
     assert found['shear law'].max() < 25.0
-    assert found['shear law'].mean() < min(found['mu N'].mean(), found['constant'].mean())
+    assert beats_the_others(found)
+
+
+def test_the_knee_of_a_ring_without_readings_is_the_geometric_mean_of_thesis_and_delft(thesis, logs):
+    mean = np.sqrt(own_law(thesis).knee_stress * own_law(logs).knee_stress)
+    assert mean == pytest.approx(PRIOR_LAW.knee_stress, rel=0.02)
+    stress = fitted(thesis, thesis.readings, PRIOR_LAW).shear_stress
+    assert stress == pytest.approx(PRIOR_LAW.shear_stress, rel=0.06)  # at a knee of 0.31 MPa
 
 
 def test_the_shipped_seal_has_the_law_of_the_readings_of_the_thesis(thesis):
-    text = (ROOT / 'config' / 'seals' / 'ms28775_114_stress.yaml').read_text()
-    stress, exponent = (float(re.search(rf'{key}: ([0-9.]+)', text)[1]) for key in ('shear_stress', 'exponent'))
+    law = parse_seal(read_yaml(ROOT / 'config' / 'seals' / 'ms28775_114_stress.yaml')).coulomb_law
     found = fitted(thesis, thesis.readings)
-    assert found.shear_stress == pytest.approx(stress, rel=0.02)
-    assert found.exponent == pytest.approx(exponent, abs=0.02)
+    assert (law.shear_stress, law.knee_stress) == pytest.approx((found.shear_stress, found.knee_stress), rel=1e-3)
+    case = parse_oring_case(read_yaml(config_path('oring', 'ms28775_114_blind'))).friction.law
+    assert (case.shear_stress, case.knee_stress) == pytest.approx((law.shear_stress, law.knee_stress), rel=0.01)
 
 
 # -- other sections of the Delft rig ----------------------------------------------------------------------------------
@@ -102,11 +142,11 @@ def after_3_bar_of(log, bars, document):
     readings = [delft_reading(DELFT / f'{log}_{bar}bar.csv', 0.025) for bar in bars]
     measured = {'seals': 1, 'pressures': [1e5 * bar for bar in bars], 'frictions': [one.friction for one in readings]}
     case = {'name': log, 'source': log, 'pressures': [0.0, *measured['pressures']], 'measured': measured}
-    return with_one_reading(computed_ring(case | document, DELFT_LINES))['shear law'][bars.index(3)]
+    return with_one_reading(computed_ring(case | document))['shear law'][bars.index(3)]
 
 
 def test_one_reading_of_the_x_ring_predicts_1_to_5_bar_within_20_percent_and_misses_7_bar():
-    ring = ring_of('delft_x_ring', DELFT_LINES)
+    ring = ring_of('delft_x_ring')
     found = with_one_reading(ring)
     after_3_bar = found['shear law'][1]
     assert np.abs(after_3_bar[[0, 2]]).max() < 20.0
@@ -132,7 +172,7 @@ def test_friction_of_the_x_ring_at_7_bar_depends_on_cycle_and_place_which_no_con
 @needs_delft
 @pytest.mark.parametrize(
     ('log', 'bars', 'document', 'within'),
-    [('NAPN', (1, 3, 5, 7), LIP_SEAL, (10.0,) * 4), ('Stadium_lc', (1, 2, 3, 4, 5), ROUND_SEAL, (20.0,) * 4 + (35.0,))],
+    [('NAPN', (1, 3, 5, 7), LIP_SEAL, (20.0, 20.0, 60.0, 60.0)), ('Stadium_lc', (1, 2, 3, 4, 5), ROUND_SEAL, (20.0,) * 4 + (35.0,))],
     ids=['lip seal', 'stadium'],
 )
 def test_one_reading_at_3_bar_predicts_other_pressures_of_another_seal(log, bars, document, within):

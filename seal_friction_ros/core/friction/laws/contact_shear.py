@@ -1,4 +1,4 @@
-"""Coulomb friction as a shear stress over the contact of a ring: a power of the local contact stress."""
+"""Coulomb friction as a shear stress over the contact of a ring: linear under a low contact stress."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,32 +8,35 @@ from seal_friction_ros.core.foundation.monotone_table import MonotoneTable
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.friction.laws.law import FrictionLaw
 
-REFERENCE_STRESS = 1e6  # [Pa] contact stress at which the shear stress is c
+LOWEST_KNEE, HIGHEST_KNEE = 1.0, 1e12  # [Pa]
 
 
 @dataclass(frozen=True)
 class ShearLaw(CheckedParameters):
     r"""Shear stress of a sliding contact from its local contact stress.
 
-    .. math:: \tau = c\,(\sigma / 1\,\mathrm{MPa})^n
+    .. math:: \tau = \tau_0 \operatorname{arsinh}\frac{\sigma}{\sigma_0}
 
-    It belongs to rubber, wall and lubricant, and holds for a ring of any size. n = 1 is a constant coefficient of
-    friction; n = 0 is the limit of a constant shear stress over the real contact, where that is all of the contact. The
-    form is our choice.
+    Far below the knee sigma_0 the coefficient of friction is tau_0 / sigma_0. Far above it the shear stress grows with
+    the logarithm of the contact stress only, by 0.69 tau_0 when that doubles. The law belongs to rubber, wall and
+    lubricant, and holds for a ring of any size. The form is our choice: docs/oring.md compares it with others.
 
     ValueError: a value is out of bounds.
     """
 
     shear_stress: float = parameter(
-        unit='Pa', lower=1.0, upper=1e9, description='c, shear stress at a contact stress of 1 MPa.'
+        unit='Pa', lower=1.0, upper=1e12, description='tau_0, shear stress at 1.18 times the knee.'
     )
-    exponent: float = parameter(
-        unit='1', lower=0.0, upper=1.0, description='n; 0: constant shear stress, 1: constant coefficient of friction.'
+    knee_stress: float = parameter(
+        unit='Pa',
+        lower=LOWEST_KNEE,
+        upper=HIGHEST_KNEE,
+        description='sigma_0, contact stress up to which the shear stress is proportional to it.',
     )
 
 
 def contact_shear(shear_stress: float, table: Bound, pressure: float, _speed: float) -> float:
-    """f_c = c A_n(P) [N]."""
+    """f_c = tau_0 A(P) [N]."""
     return shear_stress * evaluate(table, pressure, 0.0)
 
 
@@ -42,10 +45,10 @@ class ContactShear(ShearLaw, FrictionLaw):
     r"""Coulomb friction as the integral of a shear stress over the contact.
 
     .. math::
-        f_c = \int \tau(\sigma)\,dA = c\,A_n(P), \quad
-        A_n = \int (\sigma / 1\,\mathrm{MPa})^n\,dA
+        f_c = \int \tau(\sigma)\,dA = \tau_0\,A(P), \quad
+        A = \int \operatorname{arsinh}(\sigma / \sigma_0)\,dA
 
-    `seal_friction oring` computes A_n at each pressure by finite elements. Above the last pressure A_n rises with the
+    `seal_friction oring` computes A at each pressure by finite elements. Above the last pressure A rises with the
     slope that it has there (our choice).
 
     ValueError: fewer than two pressures, pressures that do not increase, or an
@@ -53,14 +56,14 @@ class ContactShear(ShearLaw, FrictionLaw):
     """
 
     NAME = 'contact_shear'
-    FORMULA = 'c A_n(P)'
+    FORMULA = 'tau_0 A(P)'
     function = staticmethod(contact_shear)
 
     pressures: tuple[float, ...] = parameter(
         unit='Pa', lower=0.0, upper=1e9, description='Gauge pressures, increasing.'
     )
     areas: tuple[float, ...] = parameter(
-        unit='m2', lower=1e-12, upper=1e6, description='A_n at each pressure, not decreasing.'
+        unit='m2', lower=1e-12, upper=1e6, description='A, area that tau_0 acts on at each pressure, not decreasing.'
     )
 
     def check_together(self) -> None:
@@ -69,5 +72,5 @@ class ContactShear(ShearLaw, FrictionLaw):
 
     @cached_property
     def table(self) -> MonotoneTable:
-        """A_n over pressure."""
+        """A over pressure."""
         return MonotoneTable(self.pressures, self.areas, 'ContactShear', rises=True)
