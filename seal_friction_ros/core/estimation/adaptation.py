@@ -9,7 +9,8 @@ the rod accelerates.
 `IMPLAUSIBLE` standard deviations, or a mean over `SHORT_TIME` of more than `LASTING`, is not explained by anything that
 the filter knows: then nobody knows whether it is friction, so the estimate is marked, whatever caused it. So is one
 whose force sum only an offset explains, before both directions have told friction from offset: the rod may be held. A
-slow rod may be at rest while its sensor has a zero: outliers are not learnt from there, and mark earlier.
+slow rod that was faster before may be at rest while its sensor has a zero: outliers are not learnt from there, and mark
+earlier.
 
 Source: normalised innovations as a check of consistency, [BarShalom2001]_ chapter 5; friction as the half difference of
 the two directions, as the thesis evaluates Tables A-1 to A-3. All numbers are our choice.
@@ -25,6 +26,7 @@ from seal_friction_ros.core.estimation.friction_filter import (
     OUTLIER,
     PROVEN,
     SCALE_PRIOR,
+    USUAL_TIME,
     FrictionFilter,
     Reading,
     disregarded,
@@ -47,7 +49,7 @@ SETTLED = 0.99  # [-] of the friction, which its lagging value must have reached
 JUMPED = 1.1  # [-] of it that the lagging value must not exceed after a pressure that the law does not know
 LARGEST_INERTIA = 0.5  # [-] of the friction, in a reading with a known mass: the mass may be wrong
 LONGEST_STEP = 0.1  # [s] after a longer gap the acceleration starts anew
-LEARNING_INTERVAL = 19_500_000  # [ns] least time between two samples that are learnt from: all of a log at 100 Hz
+LEARNING_INTERVAL = 19_500_000  # [ns] least time between two samples that are learnt from: all of a log at 50 Hz
 LEAST_STD = 0.01  # [-] of the friction, below which no standard deviation is believed
 IMPLAUSIBLE = 5.0  # [-] innovation over its standard deviation that is a fault of its own
 WRONG_DIRECTION = 1.5  # [-] of the friction that a sample misses whose direction is wrong: it misses twice the friction
@@ -171,6 +173,7 @@ class AdaptationState(NamedTuple):
     twice: Lagging
     acceleration: float  # [m/s^2] of the velocity after two lags
     way: float  # [m] since the last reading of the filter
+    fastest: float  # [m/s] fastest speed, which fades over `USUAL_TIME`
     bias: float  # [-] mean of the normalised innovations over `SHORT_TIME`
     filter: FrictionFilter
     strokes: Strokes
@@ -185,6 +188,7 @@ NOT_ADAPTED = AdaptationState(
     twice=NO_SIGNALS,
     acceleration=0.0,
     way=0.0,
+    fastest=0.0,
     bias=0.0,
     filter=NOT_BEGUN,
     strokes=Strokes(),
@@ -205,7 +209,7 @@ class Slide(NamedTuple):
     is_pressed: bool  # whether the rod rests under the breakaway force
     is_usable: bool  # whether every input is good
     is_identified: bool  # whether the law was identified at this pressure and speed
-    may_rest: bool  # whether the velocity may be the zero of its sensor
+    slow: float  # [m/s] speed below which a rod may be at rest: the velocity may be the zero of its sensor
 
 
 @compilable
@@ -239,13 +243,16 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     acceleration = (once.velocity - state.twice.velocity) / (elapsed + LAG)
     rest = _rested(state, slide, direction, elapsed)
     bias, known, strokes = state.bias, state.filter, state.strokes
+    speed, fastest = abs(velocity), state.fastest * (1.0 - elapsed / USUAL_TIME)
+    fastest = speed if speed > fastest else fastest
+    may_rest = speed < slide.slow <= fastest  # a rod that is never faster could not be learnt from at all
     way = state.way + 0.5 * elapsed * (state.twice.velocity + twice.velocity)
     if slide.is_usable and direction != 0 and _is_even(settings, acceleration, at_first, friction):
         is_outlier = False
         if slide.is_identified and known.stamp != NEVER:
             missed = _missed(state, newest) / known.innovation_std
             bias += elapsed / (elapsed + SHORT_TIME) * (between(-IMPLAUSIBLE, missed, IMPLAUSIBLE) - bias)
-            is_outlier = slide.may_rest and abs(missed) > OUTLIER
+            is_outlier = may_rest and abs(missed) > OUTLIER
         most = JUMPED if slide.is_identified and not strokes.present.is_identified else math.inf
         if most * friction >= twice.friction * direction >= SETTLED * friction >= LEAST_FRICTION:
             force, law = twice.force_sum - settings.moving_mass * acceleration, twice.friction * direction
@@ -255,8 +262,8 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
                 known = disregarded(known, reading, elapsed)
             elif slide.is_identified:
                 known, way = updated(known, reading), 0.0
-    outlook = outlook_of(settings, known, way, bias, acceleration, slide.may_rest)
-    return AdaptationState(slide.stamp, once, twice, acceleration, way, bias, known, strokes, rest, outlook)
+    outlook = outlook_of(settings, known, way, bias, acceleration, may_rest)
+    return AdaptationState(slide.stamp, once, twice, acceleration, way, fastest, bias, known, strokes, rest, outlook)
 
 
 @compilable
@@ -265,7 +272,7 @@ def _interrupted(settings: AdaptationSettings, state: AdaptationState, stamp: in
     known, way, rest = state.filter, state.way, Rest(stamp, 0.0, 0.0, 0.0)
     strokes = Strokes(NO_STROKE, NO_STROKE, state.strokes.ratio, state.strokes.reversals)
     outlook = outlook_of(settings, known, way, 0.0, 0.0, False)
-    return AdaptationState(stamp, newest, newest, 0.0, way, 0.0, known, strokes, rest, outlook)
+    return AdaptationState(stamp, newest, newest, 0.0, way, state.fastest, 0.0, known, strokes, rest, outlook)
 
 
 @compilable

@@ -97,7 +97,11 @@ class EstimatorSettings:
     """
 
     stick_velocity: float = parameter(
-        1e-3, unit='m/s', lower=0.0, upper=1.0, description='A sliding rod is at rest at this speed and below.'
+        1e-3,
+        unit='m/s',
+        lower=0.0,
+        upper=1.0,
+        description='A sliding rod is at rest at this speed and below; a zero of the sensor may be 5 times as large.',
     )
     slip_velocity: float = parameter(
         2e-3, unit='m/s', lower=0.0, upper=1.0, description='A rod at rest slides above this speed.'
@@ -437,7 +441,7 @@ def learn_from(
         stamp=seen.stamp, velocity=seen.velocity, force_sum=seen.force_sum,
         friction=friction.coulomb_friction + friction.velocity_friction, friction_std=friction.coulomb_friction_std,
         is_pressed=estimate.state == BREAKAWAY, is_usable=not status & ~_EXTRAPOLATED, is_identified=status == 0,
-        may_rest=abs(seen.velocity) < ZERO_MAX * parameters.settings.stick_velocity,
+        slow=ZERO_MAX * parameters.settings.stick_velocity,
     )  # fmt: skip
     return adapt(parameters.adaptation, known, slide)
 

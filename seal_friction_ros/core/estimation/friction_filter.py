@@ -361,7 +361,8 @@ def disregarded(known: FrictionFilter, reading: Reading, elapsed: float) -> Fric
         reading: What it shows.
         elapsed: [s] that it stands for.
     """
-    missed = reading.force - expected(known.terms, reading) + known.terms.remainder
+    terms = replace(known.terms, offset=known.terms.offset + reading.way * known.terms.gradient)
+    missed = reading.force - expected(terms, reading) + terms.remainder
     return replace(known, unexplained=_followed(known, reading.friction, missed, 1.0, elapsed))
 
 

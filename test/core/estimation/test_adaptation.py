@@ -161,7 +161,7 @@ def test_at_rest_and_without_a_force_sum_there_is_no_residual(mode):
 
 LAW_AT_40 = ActuatorFriction(40.0, 4.0, 10.0, True, 0.0)
 SETTINGS = AdaptationSettings()
-EVEN = Slide(START, 0.02, 45.0, 40.0, 4.0, False, True, True, False)
+EVEN = Slide(START, 0.02, 45.0, 40.0, 4.0, False, True, True, 0.005)
 """Even sliding at 45 N where the law says 40 N."""
 
 
@@ -219,6 +219,32 @@ def test_at_rest_what_was_learnt_stays():
     rested = adapted(at_rest, state=taught)
     assert rested.filter == taught.filter
     assert rested.strokes == taught.strokes
+
+
+def test_a_slow_rod_that_was_fast_may_be_at_rest_so_its_outliers_are_not_learnt_from_but_count_as_unexplained():
+    taught = adapted(strokes(10.0))
+    creeping = adapted(moving(2.0, lambda _: 0.003, lambda _: 0.0, taught.stamp + SECOND // 100), state=taught)
+    assert creeping.filter._replace(unexplained=taught.filter.unexplained) == taught.filter
+    assert creeping.filter.unexplained.drift == pytest.approx(-learnt(taught).scale * 40.0, rel=0.05)
+    assert creeping.outlook.most < 0.0
+
+
+def test_a_rod_that_is_always_slow_is_learnt_from_after_a_jump_of_its_friction():
+    def side(time):
+        return 1.0 if int(time / 5.0 + 1e-9) % 2 == 0 else -1.0
+
+    def slow(seconds, friction, start):
+        return moving(seconds, lambda t: 0.004 * side(t), lambda t: friction * side(t), start, 0.02)
+
+    before = adapted(slow(40.0, 40.0, START))
+    after = adapted(slow(40.0, 80.0, before.stamp + SECOND // 50), state=before)
+    assert learnt(after).scale == pytest.approx(2.0, rel=0.05)
+
+
+@pytest.mark.parametrize(('force', 'is_marked'), [(40.0, False), (0.0, True), (-20.0, True)])
+def test_a_rod_in_one_direction_may_be_held_if_only_an_offset_explains_its_force_sum(force, is_marked):
+    held = adapted(moving(5.0, lambda _: 0.003, lambda _: force, step=0.02))
+    assert (held.outlook.most < 0.0) is is_marked
 
 
 def test_outside_the_identified_range_strokes_are_seen_and_the_filter_is_not_touched():

@@ -172,7 +172,10 @@ def test_friction_of_the_x_ring_at_7_bar_depends_on_cycle_and_place_which_no_con
 @needs_delft
 @pytest.mark.parametrize(
     ('log', 'bars', 'document', 'within'),
-    [('NAPN', (1, 3, 5, 7), LIP_SEAL, (20.0, 20.0, 60.0, 60.0)), ('Stadium_lc', (1, 2, 3, 4, 5), ROUND_SEAL, (20.0,) * 4 + (35.0,))],
+    [
+        ('NAPN', (1, 3, 5, 7), LIP_SEAL, (20.0, 20.0, 60.0, 60.0)),
+        ('Stadium_lc', (1, 2, 3, 4, 5), ROUND_SEAL, (20.0,) * 4 + (35.0,)),
+    ],
     ids=['lip seal', 'stadium'],
 )
 def test_one_reading_at_3_bar_predicts_other_pressures_of_another_seal(log, bars, document, within):
