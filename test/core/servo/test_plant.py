@@ -294,9 +294,12 @@ def test_force_ramp_to_99_percent_of_breakaway_moves_nothing_at_101_it_moves(dir
 
 @pytest.mark.parametrize('direction', [1.0, -1.0])
 def test_a_rod_breaks_away_and_slides_by_its_direction_relative_to_the_pressure(direction):
-    """One rod seal in chamber a: out of it is away from its pressure, in is towards it."""
+    """One rod seal in chamber a: out of it is away from its pressure, in is towards it.
+
+    A seal without friction stands beside it, so that the compiled code of two seals serves here, too.
+    """
     uneven = dataclasses.replace(SEAL, pressure_asymmetry=PressureAsymmetry(asymmetry=-0.4, full_pressure=1e6))
-    servo = ServoParameters(seals=(MountedSeal(uneven, 'a'),))
+    servo = ServoParameters(seals=(MountedSeal(uneven, 'a'), MountedSeal(SEAL, 'b', friction_scale=0.0)))
     state = plant(servo)
     mean = actuator_friction((MountedSeal(SEAL, 'a'),), state.charge_a, 0.0)
     breakaway = outputs(servo, state, load_force=direction).breakaway_force
