@@ -21,7 +21,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.compiled import chosen_by_type, compiled, for_compiler
+from seal_friction_ros.core.foundation.compiled import chosen_by_type, compilable, for_compiler
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.servo.cylinder import AMBIENT, Cylinder
 from seal_friction_ros.core.servo.hydraulics import ServoValve
@@ -122,7 +122,7 @@ def gains(controller: ServoController, c: Constants, period: float) -> Gains:
     )
 
 
-@compiled
+@compilable
 def limit_reference(g: Gains, last: float, reference: Setpoint) -> tuple[Setpoint, int]:
     """Reference within the limits, from the last position ``last`` [m], and bits of `Limited`."""
     position, velocity, acceleration = reference
@@ -142,7 +142,7 @@ def limit_reference(g: Gains, last: float, reference: Setpoint) -> tuple[Setpoin
     return Setpoint(position, velocity, acceleration), limited
 
 
-@compiled
+@compilable
 def oil_opening(
     valve: ServoValve, cylinder: Cylinder, bandwidth: float, measured: Measurement, force: float, speed: float
 ) -> float:
@@ -179,7 +179,7 @@ class LoadPressureGains(NamedTuple):
     leakage: float  # [1/s]
 
 
-@compiled
+@compilable
 def air_gains(
     valve: PneumaticValve, cylinder: Cylinder, pressures: tuple[float, float], position: float, extends: bool
 ) -> LoadPressureGains:
@@ -211,7 +211,7 @@ def air_gains(
     return LoadPressureGains(conductance * by_opening, ADIABATIC_INDEX * by_motion, 0.0)
 
 
-@compiled
+@compilable
 def air_opening(
     valve: PneumaticValve, cylinder: Cylinder, bandwidth: float, measured: Measurement, force: float, speed: float
 ) -> float:
@@ -230,7 +230,7 @@ valve_opening = chosen_by_type({ServoValve: oil_opening, PneumaticValve: air_ope
 """Opening of the valve for a force command [-], not limited."""
 
 
-@compiled
+@compilable
 def control(
     g: Gains, c: Constants, state: ControllerState, measured: Measurement, reference: Setpoint, feedforward: float
 ) -> tuple[ControllerState, Command]:

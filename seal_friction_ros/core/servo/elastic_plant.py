@@ -15,7 +15,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from seal_friction_ros.core.foundation.compiled import compiled, for_compiler
+from seal_friction_ros.core.foundation.compiled import compilable, for_compiler
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.friction.actuator import NO_SEALS, MountedSeal, friction_of_seals, sliding_friction_of_seals
 from seal_friction_ros.core.friction.presliding import (
@@ -125,7 +125,7 @@ class SealShear(NamedTuple):
 NO_SHEAR = SealShear(NOT_SHEARED, NOT_SHEARED, 0.0, 0.0)
 
 
-@compiled
+@compilable
 def sheared(elastic: Any, state: SealShear, slide: Slide, velocity: float) -> SealShear:
     """State after a displacement of the rod, which has ``velocity`` [m/s] at its end."""
     displacement, elapsed, coulomb, excess, stiction = slide
@@ -140,7 +140,7 @@ def sheared(elastic: Any, state: SealShear, slide: Slide, velocity: float) -> Se
     return SealShear(first, second, 0.0, force + force_of_rest)
 
 
-@compiled
+@compilable
 def energy_of_seals(elastic: Any, state: SealShear) -> float:
     """Energy in the sheared seals [J]."""
     if elastic.is_lugre:
@@ -150,10 +150,10 @@ def energy_of_seals(elastic: Any, state: SealShear) -> float:
     return energy
 
 
-@compiled
+@compilable
 def _stage(c: Constants, elastic: Any, state: SealShear, y: Any, start: float, elapsed: float) -> SealShear:
     """Seals at a stage of a step that began at the position ``start`` [m]."""
-    a, b = chamber_pressures(c, y)
+    a, b = chamber_pressures(c.cylinder, y)
     velocity = y[1]
     at_rest = friction_of_seals(c.seals, a, b, 0.0)
     ahead = 1 if velocity > 0.0 else -1
@@ -170,7 +170,7 @@ def for_elastic_step(elastic: ElasticSeals | None, c: Constants) -> Any:
     return for_compiler(elastic.numbers), c._replace(seals=for_compiler(NO_SEALS))
 
 
-@compiled
+@compilable
 def elastic_step(
     c: Constants, seal_less: Any, plant: PlantState, seals: SealShear, command: float, load_force: float, h: float
 ) -> tuple[PlantState, SealShear]:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from seal_friction_ros.core.foundation.compiled import compiled
+from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.foundation.units import PSI
 from seal_friction_ros.core.servo.cylinder import Cylinder
@@ -47,7 +47,7 @@ class ServoValve(CheckedParameters):
         return self.rated_flow / math.sqrt(self.rated_pressure_drop / 2.0)
 
 
-@compiled
+@compilable
 def signed_root(drop: float, transition: float) -> float:
     r"""Root of a pressure drop with its sign, laminar (finite slope) near zero.
 
@@ -64,7 +64,7 @@ def signed_root(drop: float, transition: float) -> float:
     return math.sqrt(transition) * r * (5.0 - r * r) / 4.0
 
 
-@compiled
+@compilable
 def port_flow(valve: ServoValve, opening: float, outside: float, pressure: float) -> float:
     """Flow into a chamber through one land [m^3/s]: sharp-edged orifice and null leakage.
 
@@ -85,7 +85,7 @@ class ChamberRates(NamedTuple):
     dissipated: float  # [W] in the lands and by leakage
 
 
-@compiled
+@compilable
 def oil_rates(
     valve: ServoValve, cylinder: Cylinder, enthalpies: tuple[float, float], y: Sequence[float]
 ) -> ChamberRates:
@@ -127,7 +127,7 @@ def oil_rates(
     return ChamberRates(rate_a, rate_b, 0.0, 0.0, power_in, power_in - into_chambers)
 
 
-@compiled
+@compilable
 def oil_energy(_valve: ServoValve, cylinder: Cylinder, charge: float, volume: float) -> float:
     r"""Energy in one chamber [J]: V_oil (H(p) - p) - p V_cavity."""
     beta, pressure = cylinder.bulk_modulus, max(charge, cylinder.vapour)

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from seal_friction_ros.core.foundation.compiled import chosen_by_type, compiled, for_compiler
+from seal_friction_ros.core.foundation.compiled import chosen_by_type, compilable, for_compiler
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.friction.actuator import (
     NO_SEALS,
@@ -104,36 +104,36 @@ def constants(valve: Valve, cylinder: Cylinder, load: Load, seals: tuple[Mounted
     return cast(Constants, made._replace(enthalpies=(supply, ret)))  # a tuple of numbers would become an array
 
 
-@compiled
-def chamber_pressures(c: Constants, y: Sequence[float]) -> tuple[float, float]:
+@compilable
+def chamber_pressures(cylinder: Cylinder, y: Sequence[float]) -> tuple[float, float]:
     r"""Pressures of both chambers [Pa, gauge]: their charge, but never below vapour pressure.
 
     The charge is the pressure of the oil if it filled the whole chamber, beta ln(m / (rho_0 V)). Below vapour pressure,
     oil at vapour pressure fills V exp((charge - vapour) / beta) and a cavity fills the rest. This conserves volume
     through growth and collapse of the cavity.
     """
-    return max(y[2], c.cylinder.vapour), max(y[3], c.cylinder.vapour)
+    return max(y[2], cylinder.vapour), max(y[3], cylinder.vapour)
 
 
-@compiled
-def active_force(c: Constants, y: Integrated, load_force: float) -> float:
+@compilable
+def active_force(cylinder: Cylinder, load: Load, y: Integrated, load_force: float) -> float:
     r"""Axial forces on the rod except seals and end stops [N].
 
     .. math:: A_a p_a - A_b p_b - k (x - x_k) - b v + F_{load}
 
     A_a p_a - A_b p_b is written as A_b (p_a - p_b) + (A_a - A_b) p_a, which loses no digits.
     """
-    pressure_a, pressure_b = chamber_pressures(c, y)
-    spring = c.load.spring_stiffness * (y[0] - c.load.spring_position)
-    pressing = c.cylinder.area_b * (pressure_a - pressure_b) + c.cylinder.rod_area * pressure_a
-    return pressing - spring - c.load.viscous_damping * y[1] + load_force
+    pressure_a, pressure_b = chamber_pressures(cylinder, y)
+    spring = load.spring_stiffness * (y[0] - load.spring_position)
+    pressing = cylinder.area_b * (pressure_a - pressure_b) + cylinder.rod_area * pressure_a
+    return pressing - spring - load.viscous_damping * y[1] + load_force
 
 
-@compiled
-def force_sum(c: Constants, y: Integrated, load_force: float) -> float:
+@compilable
+def force_sum(cylinder: Cylinder, load: Load, y: Integrated, load_force: float) -> float:
     """Axial forces on the rod except its seals [N]; 0 where the rod presses on a stop, which then carries it."""
-    force = active_force(c, y, load_force)
-    at_stop = y[1] == 0.0 and abs(y[0]) >= c.cylinder.limit and y[0] * force > 0.0
+    force = active_force(cylinder, load, y, load_force)
+    at_stop = y[1] == 0.0 and abs(y[0]) >= cylinder.limit and y[0] * force > 0.0
     return 0.0 if at_stop else force
 
 
@@ -141,7 +141,7 @@ fluid_rates = chosen_by_type({ServoValve: oil_rates, PneumaticValve: air_rates})
 """Rates of both chambers from valve, cylinder, enthalpies and the numbers of the state."""
 
 
-@compiled
+@compilable
 def rates(c: Constants, y: Integrated, direction: int, command: float, load_force: float) -> Integrated:
     r"""Time derivatives of the first ten numbers of `PlantState`.
 
@@ -155,12 +155,12 @@ def rates(c: Constants, y: Integrated, direction: int, command: float, load_forc
     """
     valve, load = c.valve, c.load
     velocity, spool, spool_rate = y[1], y[4], y[5]
-    a, b = chamber_pressures(c, y)
+    a, b = chamber_pressures(c.cylinder, y)
     chambers = fluid_rates(valve, c.cylinder, c.enthalpies, y)
     friction = acceleration = 0.0
     if direction != 0:
         friction = direction * sliding_friction_of_seals(c.seals, a, b, max(velocity * direction, 0.0), direction)
-        acceleration = (active_force(c, y, load_force) - friction) / load.mass
+        acceleration = (active_force(c.cylinder, load, y, load_force) - friction) / load.mass
     rubbing = load.viscous_damping * velocity * velocity + friction * velocity
     w = valve.natural_frequency
     return (
@@ -177,7 +177,7 @@ def rates(c: Constants, y: Integrated, direction: int, command: float, load_forc
     )
 
 
-@compiled
+@compilable
 def along(y: Integrated, k: Integrated, h: float) -> Integrated:
     """State ``y`` a time ``h`` [s] along the rates ``k``."""
     return (
@@ -194,7 +194,7 @@ def along(y: Integrated, k: Integrated, h: float) -> Integrated:
     )
 
 
-@compiled
+@compilable
 def smooth_step(c: Constants, y: Integrated, direction: int, command: float, load_force: float, h: float) -> Integrated:
     """Runge-Kutta step of fourth order over ``h`` [s] in one friction state; the spool stops at its ends."""
     k1 = rates(c, y, direction, command, load_force)
@@ -207,7 +207,7 @@ def smooth_step(c: Constants, y: Integrated, direction: int, command: float, loa
     return y
 
 
-@compiled
+@compilable
 def margin(c: Constants, y: Integrated, direction: int, load_force: float) -> float:
     """Distance of the friction state from its end: stuck ends below zero, sliding ends at zero.
 
@@ -216,8 +216,8 @@ def margin(c: Constants, y: Integrated, direction: int, load_force: float) -> fl
     the rod would break away and stop at once).
     """
     if direction == 0:
-        force = force_sum(c, y, load_force)
-        pressure_a, pressure_b = chamber_pressures(c, y)
+        force = force_sum(c.cylinder, c.load, y, load_force)
+        pressure_a, pressure_b = chamber_pressures(c.cylinder, y)
         at_rest = friction_of_seals(c.seals, pressure_a, pressure_b, 0.0)
         ahead = 1 if force > 0.0 else -1
         slowest = sliding_friction_of_seals(c.seals, pressure_a, pressure_b, 0.0, ahead)
@@ -225,7 +225,17 @@ def margin(c: Constants, y: Integrated, direction: int, load_force: float) -> fl
     return min(y[1] * direction, c.cylinder.limit - y[0] * direction)
 
 
-@compiled
+@compilable
+def stopped(y: Integrated, position: float, lost: float) -> tuple[Integrated, int]:
+    """State and direction of a rod at rest at ``position`` [m] after the loss of an energy ``lost`` [J].
+
+    Compiled code knows a direction from here as a number, and one from a literal 0 as a type of its own, for which it
+    would compile the equations again.
+    """
+    return (position, 0.0, y[2], y[3], y[4], y[5], y[6], y[7] + lost, y[8], y[9]), 0
+
+
+@compilable
 def after_event(c: Constants, y: Integrated, direction: int, load_force: float) -> tuple[Integrated, int]:
     """State and direction after the friction state ended at ``y``.
 
@@ -237,24 +247,24 @@ def after_event(c: Constants, y: Integrated, direction: int, load_force: float) 
         if c.cylinder.limit - position * direction <= 0.0:
             position = c.cylinder.limit * direction
         lost = 0.5 * c.load.mass * velocity * velocity
-        y = (position, 0.0, y[2], y[3], y[4], y[5], y[6], y[7] + lost, y[8], y[9])
-        if margin(c, y, 0, load_force) >= 0.0:
-            return y, 0
-    return y, 1 if force_sum(c, y, load_force) > 0.0 else -1
+        y, direction = stopped(y, position, lost)
+        if margin(c, y, direction, load_force) >= 0.0:
+            return y, direction
+    return y, 1 if force_sum(c.cylinder, c.load, y, load_force) > 0.0 else -1
 
 
-@compiled
-def cavity_margin(c: Constants, before: Integrated, after: Integrated) -> float:
+@compilable
+def cavity_margin(cylinder: Cylinder, before: Integrated, after: Integrated) -> float:
     """Smaller distance of the charges from vapour pressure [Pa]; negative if one crossed it since ``before``."""
     nearest = 1e12
     for i in (2, 3):
-        side = before[i] - c.cylinder.vapour
+        side = before[i] - cylinder.vapour
         if side != 0.0:
-            nearest = min(nearest, math.copysign(1.0, side) * (after[i] - c.cylinder.vapour))
+            nearest = min(nearest, math.copysign(1.0, side) * (after[i] - cylinder.vapour))
     return nearest
 
 
-@compiled
+@compilable
 def time_of_event(c: Constants, y: Integrated, direction: int, command: float, load_force: float, h: float) -> float:
     """Time within ``h`` [s] at or just after which the friction state ends or a cavity begins or collapses.
 
@@ -262,9 +272,9 @@ def time_of_event(c: Constants, y: Integrated, direction: int, command: float, l
     smaller of the two; if a cavity begins or collapses, in shares of their values at 0, since their units differ.
     """
     early, late, side = 0.0, h, 0
-    margin_early, cavity_early = margin(c, y, direction, load_force), cavity_margin(c, y, y)
+    margin_early, cavity_early = margin(c, y, direction, load_force), cavity_margin(c.cylinder, y, y)
     new = smooth_step(c, y, direction, command, load_force, h)
-    margin_late, cavity_late = margin(c, new, direction, load_force), cavity_margin(c, y, new)
+    margin_late, cavity_late = margin(c, new, direction, load_force), cavity_margin(c.cylinder, y, new)
     scale = margin_early / cavity_early if cavity_late <= 0.0 else 1.0
     margin_early = min(margin_early, scale * cavity_early)
     margin_late = min(margin_late, scale * cavity_late)
@@ -274,7 +284,7 @@ def time_of_event(c: Constants, y: Integrated, direction: int, command: float, l
         middle = early + (late - early) * margin_early / (margin_early - margin_late)
         middle = min(max(middle, early + 4e-10 * h), late - 4e-10 * h)
         new = smooth_step(c, y, direction, command, load_force, middle)
-        margin_middle = min(margin(c, new, direction, load_force), scale * cavity_margin(c, y, new))
+        margin_middle = min(margin(c, new, direction, load_force), scale * cavity_margin(c.cylinder, y, new))
         if margin_middle > 0.0:
             early, margin_early = middle, margin_middle
             margin_late *= 0.5 if side == 1 else 1.0
@@ -286,13 +296,13 @@ def time_of_event(c: Constants, y: Integrated, direction: int, command: float, l
     return late
 
 
-@compiled
+@compilable
 def lasts(margin_now: float, direction: int) -> bool:
     """Whether a friction state goes on: stuck also at a margin of exactly 0, sliding only above 0."""
     return margin_now > 0.0 or (direction == 0 and margin_now == 0.0)
 
 
-@compiled
+@compilable
 def inner_step(c: Constants, state: PlantState, command: float, load_force: float, h: float) -> PlantState:
     """Advance valve, chambers and rod by ``h`` [s] with command [-1 to 1] and load force [N] held.
 
@@ -306,7 +316,7 @@ def inner_step(c: Constants, state: PlantState, command: float, load_force: floa
         new = smooth_step(c, y, direction, command, load_force, rest)
         goes_on = lasts(margin(c, new, direction, load_force), direction)
         starts_inside = margin(c, y, direction, load_force) > 0.0
-        if goes_on and (cavity_margin(c, y, new) > 0.0 or not starts_inside):
+        if goes_on and (cavity_margin(c.cylinder, y, new) > 0.0 or not starts_inside):
             # A rod that decelerates below CREEP_SPEED would come to rest only after infinite time.
             if direction == 0 or new[1] * direction >= min(CREEP_SPEED, y[1] * direction):
                 return PlantState(*new, direction, transitions)
@@ -323,16 +333,15 @@ def inner_step(c: Constants, state: PlantState, command: float, load_force: floa
         transitions += 1 if (was == 0) != (direction == 0) else 0
         if rest <= 0.0:
             return PlantState(*y, direction, transitions)
-    y = (y[0], 0.0, y[2], y[3], y[4], y[5], y[6], y[7], y[8], y[9])
     transitions += 1 if direction != 0 else 0
-    return PlantState(*smooth_step(c, y, 0, command, load_force, rest), 0, transitions)
+    y, direction = stopped(y, y[0], 0.0)
+    return PlantState(*smooth_step(c, y, direction, command, load_force, rest), direction, transitions)
 
 
 chamber_energy = chosen_by_type({ServoValve: oil_energy, PneumaticValve: air_energy})
 """Energy in one chamber [J] from its charge [Pa] and volume [m^3]."""
 
 
-@compiled
 def stored_energy(c: Constants, state: PlantState) -> float:
     r"""Energy in both chambers, mass and spring [J].
 

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from seal_friction_ros.core.foundation.compiled import compiled, for_compiler
+from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.servo.cylinder import AMBIENT, Cylinder
 from seal_friction_ros.core.servo.hydraulics import ChamberRates
@@ -53,7 +53,7 @@ class PneumaticValve(CheckedParameters):
         return 0.0
 
 
-@compiled
+@compilable
 def flow_function(valve: PneumaticValve, ratio: float) -> float:
     r"""Flow over choked flow [-] at a ratio r of downstream to upstream pressure (absolute).
 
@@ -71,7 +71,7 @@ def flow_function(valve: PneumaticValve, ratio: float) -> float:
     return full if ratio <= linear_from else full * (1.0 - ratio) / (1.0 - linear_from)
 
 
-@compiled
+@compilable
 def iso6358_flow(
     valve: PneumaticValve,
     conductance: float,
@@ -95,7 +95,7 @@ def iso6358_flow(
     return -conductance * pressure_2 * REFERENCE_DENSITY * root * flow_function(valve, pressure_1 / pressure_2)
 
 
-@compiled
+@compilable
 def chamber_rates(
     valve: PneumaticValve,
     supply_opening: float,
@@ -131,7 +131,7 @@ def chamber_rates(
     return rate, temperature * (rate / absolute + growth / volume - exchange), power
 
 
-@compiled
+@compilable
 def air_rates(
     valve: PneumaticValve, cylinder: Cylinder, _enthalpies: tuple[float, float], y: Sequence[float]
 ) -> ChamberRates:
@@ -145,7 +145,7 @@ def air_rates(
     return ChamberRates(rate_a, rate_b, warming_a, warming_b, power_a + power_b, 0.0)
 
 
-@compiled
+@compilable
 def air_energy(_valve: PneumaticValve, _cylinder: Cylinder, pressure: float, volume: float) -> float:
     r"""Energy of the air in a chamber, and of the ambient air that the chamber displaces [J].
 
@@ -162,7 +162,6 @@ def air_pressures_at_rest(valve: PneumaticValve, cylinder: Cylinder) -> tuple[fl
     There as much air leaks in from the supply as out to the exhaust. Chamber a has A_b / A_a of the gauge pressure of
     chamber b, so the pressures have no force.
     """
-    valve = for_compiler(valve)
     low, high = 0.0, valve.supply_pressure
     for _ in range(60):
         middle = 0.5 * (low + high)
@@ -181,7 +180,7 @@ def air_chamber_rate(valve: PneumaticValve, cylinder: Cylinder) -> float:
     equal pressures: 4 and more within the bounds of the parameters.
     """
     ratio = valve.laminar_ratio
-    slope = flow_function(for_compiler(valve), ratio) / (1.0 - ratio)
+    slope = flow_function(valve, ratio) / (1.0 - ratio)
     flow = (valve.sonic_conductance + 2.0 * valve.null_conductance) * REFERENCE_PRESSURE * slope
     heat = valve.heat_conductance * (ADIABATIC_INDEX - 1.0) * valve.temperature / AMBIENT
     return (ADIABATIC_INDEX * flow + ADIABATIC_INDEX * heat) / cylinder.dead_volume

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.compiled import compiled, keep
+from seal_friction_ros.core.foundation.compiled import compilable, compiled, keep
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.friction.actuator import MountedSeal, breakaway_in, friction_of_seals
 from seal_friction_ros.core.friction.states import StateFriction, sign, state_friction
@@ -135,7 +135,7 @@ def init(parameters: ServoParameters, position: float = 0.0) -> ServoState:
     return ServoState(plant, ControllerState(position, 0.0), NO_SHEAR)
 
 
-@compiled
+@compilable
 def _advance_elastic(
     c: Constants,
     elastic: Any,
@@ -160,9 +160,12 @@ def _advance_elastic(
 
 
 @compiled
-def _advance(kept: Any, plant: PlantState, command: float, load_force: float) -> PlantState:
+def _advance(
+    kept: Any, plant: PlantState, seals: SealShear, command: float, load_force: float
+) -> tuple[PlantState, SealShear]:
+    """Plant and seals over one sample, with constant spool command [-1 to 1] and load force [N]."""
     c, _gains, time, steps, elastic = kept.value
-    return _advance_elastic(c, elastic, (time, steps), plant, NO_SHEAR, (command, load_force))[0]
+    return _advance_elastic(c, elastic, (time, steps), plant, seals, (command, load_force))
 
 
 def advance(parameters: ServoParameters, state: PlantState, spool: float, load_force: float = 0.0) -> PlantState:
@@ -172,17 +175,17 @@ def advance(parameters: ServoParameters, state: PlantState, spool: float, load_f
     """
     if parameters.elastic is not None:
         raise ValueError('advance: the seals of this servo are elastic; use step, or ServoParameters.elastic = None')
-    return _advance(parameters.kept, state, min(max(spool, -1.0), 1.0), load_force)
+    return _advance(parameters.kept, state, NO_SHEAR, min(max(spool, -1.0), 1.0), load_force)[0]
 
 
-@compiled
-def measure(c: Constants, state: PlantState) -> Measurement:
+@compilable
+def measure(cylinder: Cylinder, state: PlantState) -> Measurement:
     """Measurement of ideal sensors."""
-    pressure_a, pressure_b = chamber_pressures(c, state[:10])
+    pressure_a, pressure_b = chamber_pressures(cylinder, state[:10])
     return Measurement(state.position, state.velocity, pressure_a, pressure_b)
 
 
-@compiled
+@compilable
 def _with_elastic_seals(elastic: Any, shear: SealShear, rigid: StateFriction) -> StateFriction:
     """Friction that acts: of elastic seals the force of their shear, else that of rigid ones."""
     if elastic is None:
@@ -194,8 +197,8 @@ def _with_elastic_seals(elastic: Any, shear: SealShear, rigid: StateFriction) ->
 def _outputs(kept: Any, plant: PlantState, shear: SealShear, command: Command, load_force: float) -> ServoOutputs:
     """Outputs in a state of the plant; friction by `state_friction` of the estimator, at rest where V = 0 exactly."""
     c, _gains, _time, _steps, elastic = kept.value
-    a, b = chamber_pressures(c, plant[:10])
-    force = force_sum(c, plant[:10], load_force)
+    a, b = chamber_pressures(c.cylinder, plant[:10])
+    force = force_sum(c.cylinder, c.load, plant[:10], load_force)
     seals = friction_of_seals(c.seals, a, b, plant.velocity)
     coulomb = seals.coulomb_friction
     sliding = coulomb + seals.velocity_friction
@@ -214,22 +217,29 @@ def outputs(
     return _outputs(parameters.kept, plant, NO_SHEAR, command, load_force)
 
 
-@compiled
-def _step_measured(
+@compilable
+def _controlled(
     kept: Any, state: ServoState, measured: Measurement, reference: Setpoint, feedforward: float, load_force: float
 ) -> tuple[ServoState, ServoOutputs]:
-    c, g, time, steps, elastic = kept.value
+    c, g, _time, _steps, _elastic = kept.value
     controller, command = control(g, c, state.controller, measured, reference, feedforward)
-    plant, shear = _advance_elastic(c, elastic, (time, steps), state.plant, state.seals, (command.spool, load_force))
+    plant, shear = _advance(kept, state.plant, state.seals, command.spool, load_force)
     return ServoState(plant, controller, shear), _outputs(kept, plant, shear, command, load_force)
+
+
+@compiled
+def _step_measured(
+    kept: Any, state: ServoState, measured: Measurement, reference: Setpoint, feedforward: float
+) -> tuple[ServoState, ServoOutputs]:
+    return _controlled(kept, state, measured, reference, feedforward, 0.0)
 
 
 @compiled
 def _step(
     kept: Any, state: ServoState, reference: Setpoint, feedforward: float, load_force: float
 ) -> tuple[ServoState, ServoOutputs]:
-    measured = measure(kept.value[0], state.plant)
-    return _step_measured(kept, state, measured, reference, feedforward, load_force)
+    measured = measure(kept.value[0].cylinder, state.plant)
+    return _controlled(kept, state, measured, reference, feedforward, load_force)
 
 
 def step(
@@ -252,7 +262,7 @@ def step_measured(
     parameters: ServoParameters, state: ServoState, measured: Measurement, reference: Setpoint, feedforward: float = 0.0
 ) -> tuple[ServoState, ServoOutputs]:
     """As `step`, but the controller has the measurement of real sensors."""
-    return _step_measured(parameters.kept, state, measured, reference, feedforward, 0.0)
+    return _step_measured(parameters.kept, state, measured, reference, feedforward)
 
 
 class Trajectory(NamedTuple):

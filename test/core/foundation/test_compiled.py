@@ -58,7 +58,8 @@ def _kept_sum(kept):
     return kept.value[0] + kept.value[1]
 
 
-def test_garbage_is_seldom_collected_while_a_function_is_compiled_and_as_before_after_it():
+def test_garbage_is_seldom_collected_while_a_function_is_compiled_and_as_before_after_it(monkeypatch, tmp_path):
+    monkeypatch.setattr('numba.config.CACHE_DIR', str(tmp_path))  # else the second run of the tests compiles nothing
     before, seen = gc.get_threshold(), set()
 
     class Told(event.Listener):

@@ -16,16 +16,14 @@ from seal_friction_ros.core.servo.elastic_plant import (
     NO_SHEAR,
     ElasticSeals,
     elastic_seals,
-    elastic_step,
     energy_of_seals,
-    for_elastic_step,
     seals_of_plant,
     sheared,
 )
 from seal_friction_ros.core.servo.hydraulics import ServoValve
 from seal_friction_ros.core.servo.motions import Setpoint, Sine
 from seal_friction_ros.core.servo.plant import Load, stored_energy
-from seal_friction_ros.core.servo.position_servo import ServoParameters, advance, init, simulate, step
+from seal_friction_ros.core.servo.position_servo import ServoParameters, _advance, advance, init, simulate, step
 from seal_friction_ros.files import read_yaml
 
 DOCUMENT = read_yaml(ROOT / 'config' / 'seals' / 'ms28775_114.yaml')
@@ -180,10 +178,7 @@ def test_a_mass_on_elastic_seals_swings_as_on_a_spring():
     state = state._replace(plant=state.plant._replace(velocity=1e-4))  # amplitude 0.5 um, 0.2 N
     for _ in range(400):
         plant, seals = state.plant, state.seals
-        for _ in range(5):
-            plant, seals = elastic_step(
-                servo.constants, for_elastic_step(servo.elastic, servo.constants), plant, seals, 0.0, 0.0, 1e-4
-            )
+        plant, seals = _advance(servo.kept, plant, seals, 0.0, 0.0)
         state = state._replace(plant=plant, seals=seals)
         positions.append(plant.position)
     time = 5e-4 * np.arange(1, 401)
@@ -211,12 +206,13 @@ def test_a_rod_on_elastic_seals_counts_its_starts_and_its_stops():
 
 def test_a_spool_that_overshoots_ends_at_full_opening_with_elastic_seals_too():
     valve = ServoValve(damping_ratio=0.2)
-    servo = ServoParameters(valve=valve, controller=GENTLE, seals=SEALS, elastic=ElasticSeals(SOFT))
-    seal_less = for_elastic_step(servo.elastic, servo.constants)
+    servo = ServoParameters(
+        valve=valve, controller=GENTLE, seals=SEALS, elastic=ElasticSeals(SOFT), control_period=1e-4
+    )
     for side in (1.0, -1.0):
         plant, seals, spool = init(servo).plant, NO_SHEAR, []
         for _ in range(60):
-            plant, seals = elastic_step(servo.constants, seal_less, plant, seals, side, 0.0, 1e-4)
+            plant, seals = _advance(servo.kept, plant, seals, side, 0.0)
             spool.append(side * plant.spool)
             assert plant.spool_rate == 0.0 or spool[-1] < 1.0
         assert max(spool) == 1.0
@@ -227,12 +223,12 @@ def test_halving_the_step_of_elastic_seals_reduces_the_error_to_a_sixteenth():
     """Runge-Kutta of fourth order where the law is smooth: below yielding, with a spool that moves."""
     spring = Presliding(stiffness=2e6, yield_exponent=0.0)
     servo = ServoParameters(seals=SEALS, elastic=ElasticSeals(spring), load=Load(spring_stiffness=2e4))
-    seal_less = for_elastic_step(servo.elastic, servo.constants)
     ends = []
     for steps in (20, 40, 80, 640):
+        fine = replace(servo, control_period=4e-3 / steps, inner_step=4e-3 / steps)
         plant, seals = init(servo).plant, NO_SHEAR
         for _ in range(steps):
-            plant, seals = elastic_step(servo.constants, seal_less, plant, seals, 1e-3, 5.0, 4e-3 / steps)
+            plant, seals = _advance(fine.kept, plant, seals, 1e-3, 5.0)
         ends.append(np.array(plant[:8]) / [1e-6, 1e-3, 1e6, 1e6, 1e-3, 1.0, 1e-3, 1e-3])
     errors = [np.abs(end - ends[-1]).max() for end in ends[:3]]
     assert errors[0] > 1e-9

@@ -12,7 +12,7 @@ from seal_friction_ros.core.friction.actuator import MountedSeal
 from seal_friction_ros.core.servo.controller import ServoController
 from seal_friction_ros.core.servo.cylinder import AMBIENT, Cylinder
 from seal_friction_ros.core.servo.motions import Sine
-from seal_friction_ros.core.servo.plant import Load, fastest_rate, inner_step, stored_energy
+from seal_friction_ros.core.servo.plant import Load, fastest_rate, stored_energy
 from seal_friction_ros.core.servo.pneumatics import (
     GAS_CONSTANT,
     PneumaticValve,
@@ -192,13 +192,12 @@ def test_stuck_rod_leaks_to_the_same_pressure_in_both_chambers():
 
 def moved(servo, steps, inner):
     """The axis after to and fro with two rests: state and relative error of its energy."""
+    fine = dataclasses.replace(servo, control_period=inner, inner_step=inner / steps)
     start = state = init(servo).plant
     turnover = 0.0
     for i in range(4000):
         before = state.energy_in
-        for _ in range(steps):
-            command = (0.05, 0.0, -0.05, 0.0)[i // 500 % 4]
-            state = inner_step(servo.constants, state, command, 5.0, inner / steps)
+        state = advance(fine, state, (0.05, 0.0, -0.05, 0.0)[i // 500 % 4], 5.0)
         turnover += abs(state.energy_in - before)
     stored = stored_energy(servo.constants, state) - stored_energy(servo.constants, start)
     return state, abs(state.energy_in - stored - state.energy_dissipated) / turnover

@@ -96,7 +96,7 @@ def test_no_chatter_at_rest_with_noise_on_every_sensor():
     states = set()
     noise = rng.normal(size=(20000, 5)) * [1e-6, 2e-4, 2e3, 2e3, 1.0]
     for i, (x, v, a, b, f) in enumerate(noise.tolist()):
-        exact, out = measure(c, plant), outputs(SERVO, plant)
+        exact, out = measure(c.cylinder, plant), outputs(SERVO, plant)
         noisy = exact._replace(
             position=exact.position + x,
             velocity=exact.velocity + v,
@@ -197,7 +197,7 @@ def test_command_beyond_what_supply_and_spool_can_do_is_cut_and_says_so():
     _, out = step(SERVO, init(SERVO), Setpoint(0.0, 0.0, 0.0), 1e9)
     assert out.command.limited == Limited.FORCE
     assert out.command.force == pytest.approx(SERVO.cylinder.area_a * (SERVO.valve.supply_pressure - 1e5))
-    fast = measure(SERVO.constants, init(SERVO).plant)._replace(velocity=5.0)
+    fast = measure(SERVO.cylinder, init(SERVO).plant)._replace(velocity=5.0)
     _, command = control(SERVO.gains, SERVO.constants, ControllerState(0.0, 0.0), fast, Setpoint(0.0, 0.0, 0.0), 0.0)
     assert command.limited == Limited.FORCE | Limited.SPOOL
     assert command.spool == 1.0
@@ -336,7 +336,7 @@ def test_a_step_without_feed_forward_and_load_has_none_and_ideal_sensors_measure
     state = init(SERVO)
     for i in range(20):
         setpoint = WAVE.at(i * SERVO.control_period)
-        ideal = measure(SERVO.constants, state.plant)
+        ideal = measure(SERVO.cylinder, state.plant)
         assert step_measured(SERVO, state, ideal, setpoint, 5.0) == step(SERVO, state, setpoint, 5.0, 0.0)
         assert step_measured(SERVO, state, ideal, setpoint) == step(SERVO, state, setpoint)
         assert step(SERVO, state, setpoint)[1].command.force == pytest.approx(

@@ -11,7 +11,7 @@ from seal_friction_ros.core.servo.controller import ServoController
 from seal_friction_ros.core.servo.cylinder import Cylinder, pressure_force
 from seal_friction_ros.core.servo.hydraulics import ServoValve, oil_pressures_at_rest
 from seal_friction_ros.core.servo.motions import Sine
-from seal_friction_ros.core.servo.plant import Load, inner_step, stored_energy
+from seal_friction_ros.core.servo.plant import Load, stored_energy
 from seal_friction_ros.core.servo.position_servo import ServoParameters, advance, init, outputs, simulate
 from seal_friction_ros.core.servo.tracking import tracking_rms
 from seal_friction_ros.files import default_configuration
@@ -138,10 +138,10 @@ def test_halving_the_step_reduces_the_error_of_the_energy():
     servo = single_rod(seals=SEALS)
     errors = []
     for steps in (2, 4, 8):
+        fine = dataclasses.replace(servo, control_period=5e-4, inner_step=5e-4 / steps)
         start = state = init(servo).plant
         for i in range(400):
-            for _ in range(steps):
-                state = inner_step(servo.constants, state, (0.1, -0.1)[i // 60 % 2], 0.0, 5e-4 / steps)
+            state = advance(fine, state, (0.1, -0.1)[i // 60 % 2])
         stored = stored_energy(servo.constants, state) - stored_energy(servo.constants, start)
         errors.append(abs(state.energy_in - stored - state.energy_dissipated) / state.energy_in)
     assert errors[0] < 1e-4
