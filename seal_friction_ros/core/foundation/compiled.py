@@ -98,6 +98,9 @@ def _compile_alone(made: Any, compile_function: Callable[[Any], Any], name: str,
 def _seldom_collected() -> Iterator[None]:
     """Garbage is collected a thirtieth as often: the compiler makes many records that stay."""
     before = gc.get_threshold()
+    if not 0 < before[0] < NEW_RECORDS:  # off, or another thread compiles and will restore it
+        yield
+        return
     gc.set_threshold(NEW_RECORDS, *before[1:])
     try:
         yield
