@@ -26,7 +26,7 @@ SEALS = [
     *(('x_ring', dash, 'rod') for dash in ('210', '214', '222')),
     *(('x_ring', dash, 'bore') for dash in ('214', '222')),
 ]
-COMPUTED = 'Computed, no reading: friction within a factor of 3.'
+COMPUTED = 'Computed, no reading: friction within a factor of 4.'
 SHAPES = {'o_ring': 'O-ring', 'x_ring': 'X-ring'}
 OTHERS: list[dict[str, Any]] = [
     {'name': f'u_cup_{rod}_rod', 'what': 'U-cup of polyurethane, Shore A 93', 'rod': rod, 'gland': rod + 10,

@@ -122,15 +122,26 @@ def of_others(deviations: FloatArray) -> FloatArray:
     return np.abs(deviations)[~np.eye(n, dtype=bool)].reshape(n, n - 1)
 
 
-def other_tests_as_law() -> list[FloatArray]:
-    """Magnitudes [%] as of `of_others` for each test of the thesis, its law being the mean of the other two tests.
-
-    No law of a contact knows more of a ring than two tests of the same ring.
-    """
+def tests_of_the_thesis() -> FloatArray:
+    """Friction of both seals in each of the three tests, mean of both directions [N], shape (3, 11)."""
     _, forces = dynamic_readings()
-    friction = forces.reshape(3, 11, 2).mean(axis=2)  # of both directions
+    return forces.reshape(3, 11, 2).mean(axis=2)
+
+
+def other_tests_as_law() -> list[FloatArray]:
+    """Magnitudes [%] as of `of_others` for each test of the thesis, its law being the mean of the other two tests."""
+    friction = tests_of_the_thesis()
     laws = [np.delete(friction, test, axis=0).mean(axis=0) for test in range(3)]
     return [of_others(100.0 * (np.outer(one / law, law / one) - 1.0)) for one, law in zip(friction, laws, strict=True)]
+
+
+def law_of_single_tests(thesis: Ring) -> list[FloatArray]:
+    """The same by the shear law after one reading of the test."""
+    found = []
+    for test in tests_of_the_thesis():
+        of_one = [reading._replace(friction=f / 2.0) for reading, f in zip(thesis.readings, test.tolist(), strict=True)]
+        found.append(of_others(with_one_reading(thesis._replace(readings=of_one))['shear law']))
+    return found
 
 
 def delft_log(path: Path, bore: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -188,9 +199,13 @@ def transfer_rows(lines: int = 33) -> list[dict[str, float | str]]:
     for model, found in with_one_reading(thesis).items():
         for psi, others in zip(range(0, 1001, 100), of_others(found), strict=True):
             rows.append({'test': f'thesis, reading at {psi} psi', 'model': model, **summary(others)})
-    for test, means in enumerate(other_tests_as_law(), 1):
-        name = f'test {test} of the thesis, reading at 100 psi or more'
-        rows.append({'test': name, 'model': 'mean of the other two tests', **summary(means[1:])})
+    for model, tests in (
+        ('mean of the other two tests', other_tests_as_law()),
+        ('shear law', law_of_single_tests(thesis)),
+    ):
+        for test, others in enumerate(tests, 1):
+            name = f'test {test} of the thesis, reading at 100 psi or more'
+            rows.append({'test': name, 'model': model, **summary(others[1:])})
     if logs is not delft:
         for model, found in with_one_reading(logs).items():
             others = of_others(found)

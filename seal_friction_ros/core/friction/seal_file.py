@@ -35,6 +35,7 @@ from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrect
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.identified_motion import IdentifiedMotion
 from seal_friction_ros.core.friction.laws import FRICTION_LAWS
+from seal_friction_ros.core.friction.laws.contact_shear import ContactShear
 from seal_friction_ros.core.friction.laws.friction_coefficient import FRICTION_COEFFICIENT_LAWS, FrictionCoefficientLaw
 from seal_friction_ros.core.friction.laws.law import FrictionLaw, Law
 from seal_friction_ros.core.friction.laws.normal_force import NORMAL_FORCE_LAWS, NormalForceLaw
@@ -183,7 +184,17 @@ def _friction_law(law_type: type[FrictionLaw], document: Mapping[str, Any], wher
     if not meanings(law_type):
         return law_type(**parts)
     key = law_type.PART or law_type.NAME
+    if law_type is ContactShear:
+        check_no_exponent(
+            document.get(key), f'{where}: {key}', 'compute the seal again with seal_friction oring or section'
+        )
     return from_mapping(law_type, document.get(key), f'{where}: {key}', **parts)
+
+
+def check_no_exponent(values: Any, where: str, what_to_do: str) -> None:
+    """Check that the values of a `contact_shear` are not those of an older law, whose stress was a power."""
+    if isinstance(values, Mapping) and 'exponent' in values:
+        raise ValueError(f'{where}: exponent is of an older law: {what_to_do}')
 
 
 def parse_part(part_type: Any, document: Mapping[str, Any], where: str) -> Any:

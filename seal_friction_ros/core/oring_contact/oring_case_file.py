@@ -38,7 +38,7 @@ from seal_friction_ros.core.friction.actuator import Uncertainty
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws.contact_shear import ShearLaw
 from seal_friction_ros.core.friction.laws.friction_coefficient import FrictionCoefficientLaw
-from seal_friction_ros.core.friction.seal_file import parse_part
+from seal_friction_ros.core.friction.seal_file import check_no_exponent, parse_part
 from seal_friction_ros.core.oring_contact.material import Rubber, elastic_modulus_of_hardness
 from seal_friction_ros.core.oring_contact.oring_case import Groove, OringCase, OringNumerics, check_pressures
 from seal_friction_ros.core.oring_contact.ring_friction import RingLaw, SealFriction
@@ -201,7 +201,9 @@ def _friction(document: Mapping[str, Any], where: str) -> SealFriction | None:
         raise ValueError(f'{where}: give one of contact_shear and friction_coefficient; got {", ".join(values)}')
     law: RingLaw
     if 'contact_shear' in values:
-        law = from_mapping(ShearLaw, values['contact_shear'], f'{where}: contact_shear')
+        key = f'{where}: contact_shear'
+        check_no_exponent(values['contact_shear'], key, 'give shear_stress and knee_stress')
+        law = from_mapping(ShearLaw, values['contact_shear'], key)
     else:
         law = parse_part(FrictionCoefficientLaw, values, where)
     stiction = from_mapping(_Stiction, {k: v for k, v in values.items() if k.startswith('stiction')}, where)

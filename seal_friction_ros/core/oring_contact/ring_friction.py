@@ -21,9 +21,9 @@ from seal_friction_ros.core.oring_contact.results import WallContact
 ONE_READING_STD = 0.15  # [-] scatter of readings: the same ring mounted anew differs by 0.10 to 0.15
 READINGS_OF_SCATTER = 4.0  # readings that `ONE_READING_STD` counts as, beside the scatter that is found (our choice)
 KNEE_STD = 0.7  # [-] of the logarithm of the knee about that of the prior law: a factor of 2 (our choice)
-NO_READING_STD = 2.0  # [-] a factor of 3: the law of one ring is that far off on one of other rubber, wall, lubricant
+NO_READING_STD = 2.0  # [-] rings of other rubber, wall and lubricant differ by a factor of 3 to 4
 DISCRETISATION = 0.03  # [-] of the friction: what counts as an error of mesh and grid (our choice)
-_MOST_CHANGE = 4.0 * KNEE_STD
+_MOST_CHANGE = 4.0 * KNEE_STD  # [-] largest change of the logarithm of the knee in a fit: a factor of 16 (our choice)
 BEYOND = 1.1  # share of the last computed pressure up to which a reading may lie
 
 RingLaw = FrictionCoefficientLaw | ShearLaw
@@ -82,20 +82,25 @@ def friction_law(
 
 
 def sheared_areas(pressures: Sequence[float], contacts: Sequence[WallContact], knee_stress: float) -> tuple[float, ...]:
-    """`WallContact.sheared_area` over the pressure [Pa, gauge] without falls of `DISCRETISATION` or less [m^2].
+    """`WallContact.sheared_area` over the pressure [Pa, gauge], not falling [m^2].
 
-    Rubber under more pressure does not rub less. ValueError: it falls by more.
+    Falls of `DISCRETISATION` or less count as errors of the mesh: the area before stays. ValueError: a larger fall.
     """
-    areas = np.array([contact.sheared_area(knee_stress) for contact in contacts])
-    highest = np.maximum.accumulate(areas)
-    share = areas / np.maximum(highest, np.finfo(float).tiny)
+    areas, share = _levelled(contacts, knee_stress)
     least = int(share.argmin())
     if share[least] < 1.0 - DISCRETISATION:
         raise ValueError(
             f'friction falls with pressure, at {pressures[least]:.6g} Pa by {100.0 * (1.0 - share[least]):.2g} %: the '
-            'fluid passes a lip there, or its flank lifts off; a law needs pressures on one side of it'
+            'fluid passes a lip there, or its flank lifts off; give pressures all below or all above that'
         )
-    return tuple(highest.tolist())
+    return tuple(areas.tolist())
+
+
+def _levelled(contacts: Sequence[WallContact], knee_stress: float) -> tuple[FloatArray, FloatArray]:
+    """Largest `WallContact.sheared_area` up to each contact [m^2], and the area of the contact as a share of it."""
+    areas = np.array([contact.sheared_area(knee_stress) for contact in contacts])
+    highest = np.maximum.accumulate(areas)
+    return highest, areas / np.maximum(highest, np.finfo(float).tiny)
 
 
 def friction_after(seal: Seal) -> SealFriction:
@@ -134,7 +139,7 @@ def fit_shear_law(
         s^2 = \frac{k s_0^2 + \sum_i (\ln F_i - \ln \tau_0 A(P_i))^2}{k + N - 1}
 
     so one reading leaves s_0. The speed is not in the law. All this is our choice. ValueError: a reading is at a
-    pressure that was not computed, or its friction is not positive.
+    pressure that was not computed, its friction is not positive, or `sheared_areas` falls at the knee that is found.
     """
     at = np.array([reading.pressure for reading in readings])
     friction = np.array([reading.friction for reading in readings])
@@ -148,8 +153,8 @@ def fit_shear_law(
 
     def stresses(knee_stress: float) -> FloatArray:
         """Logarithm of friction over A of each reading."""
-        areas = sheared_areas(pressures, contacts, knee_stress)
-        of_area = ContactShear(1.0, knee_stress, tuple(pressures), areas)
+        areas, _ = _levelled(contacts, knee_stress)
+        of_area = ContactShear(1.0, knee_stress, tuple(pressures), tuple(areas.tolist()))
         return np.log(friction / [of_area.coulomb_friction(p) for p in at.tolist()])
 
     def knee(change: float) -> float:
@@ -163,6 +168,7 @@ def fit_shear_law(
 
     change = float(minimize_scalar(cost, bounds=(-_MOST_CHANGE, _MOST_CHANGE), method='bounded').x)
     knee_stress = knee(round(change, 4))
+    sheared_areas(pressures, contacts, knee_stress)
     found = stresses(knee_stress)
     shear_stress = math.exp(found.mean())
     left = float(((found - math.log(shear_stress)) ** 2).sum())

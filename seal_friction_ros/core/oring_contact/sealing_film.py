@@ -19,7 +19,7 @@ from seal_friction_ros.core.oring_contact.results import WallContact
 
 _INLET = 0.37
 """dp/dx over k^1.6 (eta U)^-0.2 E*^-0.4 of the steepest rise where a film enters an edge: a fit to the films of smooth
-Hertzian line contacts by `lubrication.contact`, within 3 % of the film (our choice)"""
+Hertzian line contacts by `lubrication.contact` (our choice)"""
 _RISE = 0.95  # of the rise to the peak, up to which the edge is fitted: beyond it the stress is level (our choice)
 _CLEAR = 2.0  # rise over the transition between fluid and contact, from which a node counts (our choice)
 _FEWEST = 3  # nodes of an edge; with fewer the contact ends at a corner, or the mesh is too coarse

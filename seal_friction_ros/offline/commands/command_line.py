@@ -270,7 +270,7 @@ def positive(text: str) -> float:
 
 
 def add_film(parser: Any) -> None:
-    """Add the fluid under a seal."""
+    """Add `--film`."""
     help_text = 'viscosity [Pa s] and speed: film of each direction and leakage, as of a smooth seal'
     parser.add_argument('--film', type=quantities('Pa s', 'm/s'), metavar='VISCOSITY,SPEED', help=help_text)
 

@@ -303,6 +303,13 @@ def test_a_table_of_normal_forces_that_falls_is_refused():
     )
 
 
+def test_a_shear_law_with_an_exponent_is_refused_with_what_to_do():
+    law = {'shear_stress': 1e5, 'exponent': 0.4, 'pressures': [0.0, 1e6], 'areas': [1e-5, 2e-5]}
+    older = {'name': 'mine', 'coulomb_law': 'contact_shear', 'contact_shear': law, 'uncertainty': {'relative_std': 0.1}}
+    what_to_do = 'compute the seal again with seal_friction oring or section'
+    assert complaint(older) == f'seal mine: contact_shear: exponent is of an older law: {what_to_do}'
+
+
 def test_a_ring_that_is_not_squeezed_is_refused():
     loose = changed(POWER, 'geometry.section_diameter', 2e-3)
     assert 'SealGeometry.section_diameter = 0.002 m gives a squeeze of' in complaint(loose)

@@ -207,6 +207,10 @@ def test_case_file_may_have_a_shear_law_in_the_place_of_a_coefficient():
         ({'friction': FRICTION | SHEAR}, 'give one of contact_shear and friction_coefficient; got friction_coeff'),
         ({'friction': SHEAR | {'contact_shear': {'shear_stress': 2e5}}}, 'contact_shear lacks knee_stress'),
         (
+            {'friction': SHEAR | {'contact_shear': {'shear_stress': 2e5, 'exponent': 0.4}}},
+            'case mine: friction: contact_shear: exponent is of an older law: give shear_stress and knee_stress',
+        ),
+        (
             {'friction': SHEAR | {'contact_shear': {'shear_stress': 1e5, 'knee_stress': 0.3}}},
             'knee_stress = 0.3 Pa is below its lower bound 1.0 Pa',
         ),

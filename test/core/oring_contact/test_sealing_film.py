@@ -95,7 +95,7 @@ def test_film_of_an_x_ring_is_that_of_a_finer_mesh():
         (result,) = oring_results(case, (PRESSURE,))
         transition = case.numerics.transition * case.rubber.elastic_modulus
         films.append(seal_film(result.gland, PRESSURE, (MODULUS, transition), (VISCOSITY, SPEED))[:2])
-    assert films[0] == pytest.approx(films[1], rel=0.1)
+    assert films[0] == pytest.approx(films[1], rel=0.08)
 
 
 @pytest.fixture(scope='module')

@@ -9,6 +9,7 @@ from harness.ring_transfer import (
     delft_reading,
     fitted,
     frictions_of_cycles,
+    law_of_single_tests,
     of_others,
     off,
     other_tests_as_law,
@@ -57,11 +58,12 @@ def test_the_shear_law_of_the_thesis_is_4_percent_off_its_readings_in_the_mean_a
     assert np.abs(found).max() < 13.0
 
 
-def test_without_a_reading_the_law_of_another_rubber_is_off_by_about_a_factor_of_three(thesis, delft):
+def test_without_a_reading_the_law_of_another_rubber_is_off_by_a_factor_of_three_to_four(thesis, delft, logs):
     forward = without_reading(thesis, delft)['shear law']
-    back = without_reading(delft, thesis)['shear law']
+    back = without_reading(logs, thesis)['shear law']
     assert 200.0 < forward.min() < forward.max() < 240.0
-    assert -75.0 < back.min() < back.max() < -60.0
+    assert -75.0 < back.min() < back.max() < -66.0
+    assert -76.0 < back.mean() < -70.0
 
 
 def test_one_reading_of_delft_and_the_knee_of_the_thesis_predict_each_other_pressure_within_7_percent(thesis, delft):
@@ -89,14 +91,16 @@ def test_no_curve_through_the_other_readings_of_the_thesis_meets_that_at_100_psi
     pressures = np.array([reading.pressure for reading in thesis.readings])
     others = np.arange(len(pressures)) != 1
     curve = PchipInterpolator(pressures[others], thesis.frictions[others])
-    assert curve(pressures[1]) / thesis.frictions[1] == pytest.approx(0.89, abs=0.01)
+    assert thesis.frictions[1] / curve(pressures[1]) == pytest.approx(1.12, abs=0.01)
 
 
-def test_two_of_the_three_tests_of_the_thesis_predict_the_third_hardly_better_than_the_law(thesis):
-    """After one reading at 100 psi or more, mean over the other pressures."""
-    found = [deviations[1:].mean(axis=1) for deviations in other_tests_as_law()]
-    assert max(means.max() for means in found) > 15.0
-    assert np.mean(found) > of_others(with_one_reading(thesis)['shear law'])[1:].mean()
+def test_two_of_the_three_tests_of_the_thesis_predict_the_third_no_better_than_the_law(thesis):
+    """Mean over readings at 100 psi or more and over the other pressures of the same test."""
+    by_tests = [others[1:].mean() for others in other_tests_as_law()]
+    by_law = [others[1:].mean() for others in law_of_single_tests(thesis)]
+    assert by_tests == pytest.approx([11.6, 6.5, 8.9], abs=0.5)
+    assert by_law == pytest.approx([11.2, 6.9, 6.7], abs=0.5)
+    assert np.mean(by_law) < np.mean(by_tests)
 
 
 def test_one_log_of_delft_predicts_the_others_within_12_percent_in_the_mean_and_25_at_worst(logs):
@@ -171,16 +175,15 @@ def test_friction_of_the_x_ring_at_7_bar_depends_on_cycle_and_place_which_no_con
 
 @needs_delft
 @pytest.mark.parametrize(
-    ('log', 'bars', 'document', 'within'),
+    ('log', 'bars', 'document', 'deviations'),
     [
-        ('NAPN', (1, 3, 5, 7), LIP_SEAL, (20.0, 20.0, 60.0, 60.0)),
-        ('Stadium_lc', (1, 2, 3, 4, 5), ROUND_SEAL, (20.0,) * 4 + (35.0,)),
+        ('NAPN', (1, 3, 5, 7), LIP_SEAL, [-6.5, 0.0, 36.0, 49.6]),
+        ('Stadium_lc', (1, 2, 3, 4, 5), ROUND_SEAL, [13.1, 15.4, 0.0, -13.5, -27.2]),
     ],
     ids=['lip seal', 'stadium'],
 )
-def test_one_reading_at_3_bar_predicts_other_pressures_of_another_seal(log, bars, document, within):
-    found = after_3_bar_of(log, bars, document)
-    assert (np.abs(found) < within).all(), found
+def test_deviation_of_other_seals_after_a_reading_at_3_bar(log, bars, document, deviations):
+    assert after_3_bar_of(log, bars, document) == pytest.approx(deviations, abs=3.0)
 
 
 @needs_delft

@@ -45,6 +45,7 @@ def test_a_drawing_becomes_a_seal_file_that_meets_its_reading(tmp_path: Path, ca
     assert numbers['leakage_m3_per_m'] == pytest.approx(0.5 * differences * np.pi * 25.7e-3, rel=1e-3)
     assert 0.0 < numbers['mesh']['film_error'] < 0.2
     shown = checked_page(page)
+    assert 'content="made by seal_friction section"' in page.read_text()
     assert shown.texts['h1'] == ['Seal ring']
     assert any('meshes of 20, 29, 41 lines' in text for text in shown.texts['p'])
     rows = next(table for table in shown.tables if 'film out [um]' in table[0])[1:]

@@ -8,7 +8,7 @@ from seal_friction_ros.core.foundation.monotone_table import MonotoneTable
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.friction.laws.law import FrictionLaw
 
-LOWEST_KNEE, HIGHEST_KNEE = 1.0, 1e12  # [Pa]
+LOWEST_KNEE, HIGHEST_KNEE = 1.0, 1e12  # [Pa] bounds of the knee; at the highest a constant coefficient
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,8 @@ class ShearLaw(CheckedParameters):
 
     Far below the knee sigma_0 the coefficient of friction is tau_0 / sigma_0. Far above it the shear stress grows with
     the logarithm of the contact stress only, by 0.69 tau_0 when that doubles. The law belongs to rubber, wall and
-    lubricant, and holds for a ring of any size. The form is our choice: docs/oring.md compares it with others.
+    lubricant, and holds for a ring of any size. The form is our choice: docs/oring.md compares it
+    with mu N and a constant.
 
     ValueError: a value is out of bounds.
     """
