@@ -342,6 +342,7 @@ _NO_FRICTION = ActuatorFriction(0.0, 0.0, 0.0, True, 0.0, 0.0)
 _UNKNOWN = StateFriction(UNKNOWN, 0, 0.0)
 
 ZERO_MAX = 5.0  # [-] our choice: zero of a velocity sensor over stick_velocity; a slower rod may be at rest
+CREEP = 0.1  # [-] our choice: a rod in the band of rest is known to be at rest up to this share of stick_velocity
 SETTLING_TIME = 0.01  # [s] our choice: in this time the way of a sliding rod exceeds the ripple of its signal clearly
 SHORTEST_INTERVAL = 1e-3  # [s] our choice: over less, noise exceeds any rate, and some drivers stamp no finer
 
@@ -660,11 +661,11 @@ def _unidentified_motion(limits: MotionLimits, velocity: float) -> int:
 
 
 @compilable
-def _is_uncertain(motion: ConditionedVelocity, at_rest: bool) -> bool:
+def _is_uncertain(settings: EstimatorSettings, motion: ConditionedVelocity, at_rest: bool) -> bool:
     """Whether the velocity does not tell if the rod is at rest."""
     velocity, half_width = motion.velocity, motion.half_width
-    if at_rest:  # of a rod that creeps the friction is the force sum, too
-        return False
+    if at_rest:
+        return abs(velocity) > CREEP * settings.stick_velocity
     if motion.samples < SETTLING:
         return True
     if half_width == 0.0:  # the first step of a motion may be a ripple that is not learnt yet
