@@ -148,8 +148,9 @@ def test_bad_inputs_give_a_status_bit_a_finite_estimate_and_a_count_in_diagnosti
 def test_diagnostics_come_once_a_second_with_rates_ages_latency_and_recorder_state():
     with graph() as g:
         g.connect()
-        for i in range(20):
-            g.estimate(SECOND + i * 10**7, 0.1)
+        force = g.estimate(SECOND, 0.1).coulomb_friction
+        for i in range(1, 20):
+            g.estimate(SECOND + i * 10**7, 0.1, force=force)
         assert g.spin_until(lambda: g.probe.values('estimate').get('rod_velocity received') == '20')
         values = g.probe.values('estimate')
         assert float(values['rod_velocity rate [Hz]']) > 1.0

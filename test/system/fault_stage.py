@@ -285,7 +285,7 @@ def try_row(place: Stage, row: Row) -> list[str]:
     if level != row.level:
         wrong.append(f'diagnostics {level}, not {row.level}')
     wrong += _wrong_feedforward(row, estimates, forces)
-    wrong += _wrong_recovery(after, end_level)
+    wrong += _wrong_recovery(row, after, end_level)
     return wrong
 
 
@@ -305,15 +305,16 @@ def _wrong_feedforward(row: Row, estimates: list[FrictionEstimate], forces: list
     return [] if holds and back else [found]
 
 
-def _wrong_recovery(after: Outputs, level: str) -> list[str]:
+def _wrong_recovery(row: Row, after: Outputs, level: str) -> list[str]:
     wrong = []
+    lasts = Status.MODEL_DISAGREES if row.status == 'MODEL_DISAGREES' else 0  # until the rod has turned
     estimates = [output for output in after if isinstance(output, FrictionEstimate)]
     forces = [output for output in after if isinstance(output, FeedForward)]
-    bad = [estimate for estimate in estimates if estimate.status]
+    bad = [estimate for estimate in estimates if estimate.status & ~lasts]
     if bad:
         wrong.append(f'after the fault: {Status(bad[0].status)!r}')
     if len(estimates) != AFTER or not forces or forces[-1].limited:
         wrong.append(f'after the fault: {len(estimates)} estimates of {AFTER}, last feed-forward {forces[-1:]}')
-    if level != 'OK':
+    if level != 'OK' and not lasts:
         wrong.append(f'after the fault: diagnostics {level}')
     return wrong

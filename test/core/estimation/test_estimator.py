@@ -795,9 +795,9 @@ def test_before_anything_is_learnt_the_deviation_of_the_scale_is_that_of_the_sea
     assert adapted_step(sample(pressure=None))[1].adaptation_scale_std == 0.0  # no friction to compare with
 
 
-def test_a_sample_is_learnt_from_every_20_ms_and_no_more_often():
+def test_a_sample_is_learnt_from_every_10_ms_and_no_more_often():
     before = slid()
-    for milliseconds, learns in ((1, False), (19, False), (20, True)):
+    for milliseconds, learns in ((1, False), (9, False), (10, True)):
         after, _ = adapted_step(sample(before.adaptation.stamp + milliseconds * MS), before=before)
         assert (after.adaptation != before.adaptation) is learns
 

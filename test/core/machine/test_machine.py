@@ -135,7 +135,8 @@ def test_velocity_from_position_is_that_of_the_sensor():
     inputs = {'position': '/joint_states position[axis]', 'pressure_a': '/p_a', 'pressure_b': '/p_b'}
     run = bench_run(velocity=0.05, inputs=inputs, velocity_from_position={'step': '1 um', 'rate': '1000 Hz'})
     estimate = run.estimates()['axis']
-    assert (estimate.state, estimate.status & ~Status.MOTION_UNCERTAIN) == (FrictionState.SLIDING, 0)
+    in_one_direction = Status.MOTION_UNCERTAIN | Status.MODEL_DISAGREES  # its load is not told from friction yet
+    assert (estimate.state, estimate.status & ~in_one_direction) == (FrictionState.SLIDING, 0)
     assert estimate.direction == 1
 
 
