@@ -315,6 +315,6 @@ def _wrong_recovery(row: Row, after: Outputs, level: str) -> list[str]:
         wrong.append(f'after the fault: {Status(bad[0].status)!r}')
     if len(estimates) != AFTER or not forces or forces[-1].limited:
         wrong.append(f'after the fault: {len(estimates)} estimates of {AFTER}, last feed-forward {forces[-1:]}')
-    if level != 'OK' and not lasts:
+    if level not in (('OK', 'WARN') if lasts else ('OK',)):
         wrong.append(f'after the fault: diagnostics {level}')
     return wrong
