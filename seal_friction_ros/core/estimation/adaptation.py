@@ -176,6 +176,7 @@ class AdaptationState(NamedTuple):
     fastest: float  # [m/s] fastest speed, which fades over `USUAL_TIME`
     bias: float  # [-] mean of the normalised innovations over `SHORT_TIME`
     filter: FrictionFilter
+    by_motion: FrictionFilter  # the filter without readings of a rod that may have rested all the time
     strokes: Strokes
     rest: Rest
     outlook: Outlook
@@ -191,6 +192,7 @@ NOT_ADAPTED = AdaptationState(
     fastest=0.0,
     bias=0.0,
     filter=NOT_BEGUN,
+    by_motion=NOT_BEGUN,
     strokes=Strokes(),
     rest=Rest(),
     outlook=NO_OUTLOOK,
@@ -247,6 +249,11 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     fastest = speed if speed > fastest else fastest
     may_rest = speed < slide.slow <= fastest  # a rod that is never faster could not be learnt from at all
     way = state.way + 0.5 * elapsed * (state.twice.velocity + twice.velocity)
+    by_motion = state.by_motion
+    if fastest < slide.slow:
+        by_motion = _moved(by_motion, way - state.way)
+    elif state.fastest < slide.slow:  # the slow motion before may have been the zero of its sensor
+        known, way, bias = by_motion, 0.0, 0.0
     if slide.is_usable and direction != 0 and _is_even(settings, acceleration, at_first, friction):
         is_outlier = False
         if slide.is_identified and known.stamp != NEVER:
@@ -263,7 +270,10 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
             elif slide.is_identified:
                 known, way = updated(known, reading), 0.0
     outlook = outlook_of(settings, known, way, bias, acceleration, may_rest)
-    return AdaptationState(slide.stamp, once, twice, acceleration, way, fastest, bias, known, strokes, rest, outlook)
+    by_motion = known if fastest >= slide.slow else by_motion
+    return AdaptationState(
+        slide.stamp, once, twice, acceleration, way, fastest, bias, known, by_motion, strokes, rest, outlook
+    )
 
 
 @compilable
@@ -272,7 +282,17 @@ def _interrupted(settings: AdaptationSettings, state: AdaptationState, stamp: in
     known, way, rest = state.filter, state.way, Rest(stamp, 0.0, 0.0, 0.0)
     strokes = Strokes(NO_STROKE, NO_STROKE, state.strokes.ratio, state.strokes.reversals)
     outlook = outlook_of(settings, known, way, 0.0, 0.0, False)
-    return AdaptationState(stamp, newest, newest, 0.0, way, state.fastest, 0.0, known, strokes, rest, outlook)
+    return AdaptationState(
+        stamp, newest, newest, 0.0, way, state.fastest, 0.0, known, state.by_motion, strokes, rest, outlook
+    )
+
+
+@compilable
+def _moved(known: FrictionFilter, way: float) -> FrictionFilter:
+    """Filter after a way [m] that nothing was learnt from."""
+    if way == 0.0 or known.terms.gradient == 0.0:
+        return known
+    return replace(known, terms=replace(known.terms, offset=known.terms.offset + way * known.terms.gradient))
 
 
 @compilable

@@ -229,6 +229,14 @@ def test_a_slow_rod_that_was_fast_may_be_at_rest_so_its_outliers_are_not_learnt_
     assert creeping.outlook.most < 0.0
 
 
+def test_a_rod_that_turns_out_to_be_faster_forgets_what_its_slow_motion_taught_as_it_may_have_been_at_rest():
+    held = adapted(moving(5.0, lambda _: -0.004, lambda _: 10.0))
+    after = adapted(moving(5.0, lambda _: 0.05, lambda _: 40.0, held.stamp + SECOND // 100), state=held)
+    assert not after.outlook.is_proven
+    assert after.filter.terms.scale == pytest.approx(1.0, abs=0.01)
+    assert after.filter.terms.offset == pytest.approx(0.0, abs=0.5)
+
+
 def test_a_rod_that_is_always_slow_is_learnt_from_after_a_jump_of_its_friction():
     def side(time):
         return 1.0 if int(time / 5.0 + 1e-9) % 2 == 0 else -1.0
