@@ -56,7 +56,7 @@ WRONG_DIRECTION = 1.5  # [-] of the friction that a sample misses whose directio
 LASTING = 2.5  # [-] mean of it over `SHORT_TIME`
 SHORT_TIME = 0.1  # [s]
 STRIBECK = 0.2  # [-] of the friction: standard deviation of what it is more when slow,
-STRIBECK_SPEED = 0.01  # [m/s] as from this speed
+STRIBECK_SPEED = 0.008  # [m/s] as from this speed
 NEW_RUN = math.hypot(SCALE_PRIOR, COULOMB_PRIOR)  # [-] of the friction: standard deviation of another day
 REST = 0.1  # [s] after a motion in which the force sum may be that of the motion still
 LEAP_AT_REST = 0.3  # [-] sudden change of the force sum at rest over the friction, from which on it may be a load
@@ -140,6 +140,7 @@ class Rest(NamedTuple):
     ripple: float = 0.0  # [N^2] mean square of the force sum against its lagging value, over `SHORT_TIME`
     pressed: float = 0.0  # [s] of this rest under the breakaway force, in all
     leapt: float = 0.0  # [N^2] square of the largest sudden change of the force sum in this rest
+    held: float = 0.0  # [N] most that rests held beyond the sliding friction, which fades over `USUAL_TIME`
 
 
 ANY = 1e300  # [N] innovation that nothing is beyond, before the first reading
@@ -246,7 +247,8 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     rest = _rested(state, slide, direction, elapsed)
     bias, known, strokes = state.bias, state.filter, state.strokes
     speed, fastest = abs(velocity), state.fastest * (1.0 - elapsed / USUAL_TIME)
-    fastest = speed if speed > fastest else fastest
+    is_even = slide.is_usable and direction != 0 and _is_even(settings, acceleration, at_first, friction)
+    fastest = speed if is_even and speed > fastest else fastest
     may_rest = speed < slide.slow <= fastest  # a rod that is never faster could not be learnt from at all
     way = state.way + 0.5 * elapsed * (state.twice.velocity + twice.velocity)
     by_motion = state.by_motion
@@ -254,7 +256,7 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
         by_motion = _moved(by_motion, way - state.way)
     elif state.fastest < slide.slow:  # the slow motion before may have been the zero of its sensor
         known, way, bias = by_motion, 0.0, 0.0
-    if slide.is_usable and direction != 0 and _is_even(settings, acceleration, at_first, friction):
+    if is_even:
         is_outlier = False
         if slide.is_identified and known.stamp != NEVER:
             missed = _missed(state, newest) / known.innovation_std
@@ -279,7 +281,7 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
 @compilable
 def _interrupted(settings: AdaptationSettings, state: AdaptationState, stamp: int, newest: Lagging) -> AdaptationState:
     """State after a gap: signals and strokes begin anew."""
-    known, way, rest = state.filter, state.way, Rest(stamp, 0.0, 0.0, 0.0)
+    known, way, rest = state.filter, state.way, Rest(stamp, 0.0, 0.0, 0.0, state.rest.held)
     strokes = Strokes(NO_STROKE, NO_STROKE, state.strokes.ratio, state.strokes.reversals)
     outlook = outlook_of(settings, known, way, 0.0, 0.0, False)
     return AdaptationState(
@@ -301,13 +303,17 @@ def _rested(state: AdaptationState, slide: Slide, direction: int, elapsed: float
     before = state.rest
     change, leap = slide.force_sum - state.twice.force_sum, slide.force_sum - state.once.force_sum
     ripple = before.ripple + elapsed / (elapsed + SHORT_TIME) * (change * change - before.ripple)
+    held = before.held * (1.0 - elapsed / USUAL_TIME)
     if direction != 0:
-        return Rest(slide.stamp, ripple, 0.0, 0.0)
+        return Rest(slide.stamp, ripple, 0.0, 0.0, held)
+    beyond = abs(slide.force_sum - state.outlook.offset) - state.outlook.scale * slide.friction
+    if slide.is_usable and beyond > held and (slide.stamp - before.slid) * 1e-9 >= REST:
+        held = beyond
     pressed = before.pressed + elapsed if slide.is_pressed else before.pressed
     leapt = before.leapt
     if abs(leap) > LEAP_AT_REST * slide.friction and leap * leap > leapt:
         leapt = leap * leap
-    return Rest(before.slid, ripple, pressed, leapt)
+    return Rest(before.slid, ripple, pressed, leapt, held)
 
 
 @compilable
@@ -455,7 +461,7 @@ def friction_of_sliding(
     found = slope * law + terms.coulomb + terms.misfit + terms.viscous * speed
     found = found if found > 0.0 else 0.0
     sliding = found if lowest * law <= found <= highest * law else between(lowest * law, found, highest * law)
-    std = _std_of_sliding(known, state.outlook.unexplained_square, speed, law, file_std)
+    std = _std_of_sliding(state, speed, law, file_std)
     if uses and is_proven:
         at_no_speed = between(lowest * coulomb, slope * coulomb + terms.coulomb + terms.misfit, highest * coulomb)
         scale = sliding / law if law > 0.0 else 1.0
@@ -504,7 +510,7 @@ def friction_at_rest(
     scale = sliding / law if law > 0.0 else 1.0
     std = _std_at_rest(state, stamp, force_sum, scale * (coulomb + stiction))
     std = std if std > LEAST_STD * law else LEAST_STD * law
-    coulomb_std = _std_of_sliding(known, outlook.unexplained_square, known.speed, law, file_std)
+    coulomb_std = _std_of_sliding(state, known.speed, law, file_std)
     is_pressed, can_contradict = state.rest.pressed > LONGEST_PRESS, outlook.is_proven and law > 0.0
     if uses and outlook.is_proven:
         at_no_speed = bounded_friction(settings, known, 0.0, 0.0, coulomb)
@@ -542,19 +548,22 @@ def bounded_friction(
 
 
 @compilable
-def _std_of_sliding(
-    known: FrictionFilter, unexplained_square: float, speed: float, law: float, file_std: float
-) -> float:
+def _std_of_sliding(state: AdaptationState, speed: float, law: float, file_std: float) -> float:
     """Standard deviation of the friction of a rod that slides [N].
 
-    Slow friction that nobody has seen may be Stribeck's; what is not explained [N^2] may be friction, too.
+    Slow friction that nobody has seen may be Stribeck's, or as large as rests have held; what is not explained may be
+    friction, too.
     """
+    known = state.filter
     if known.stamp == NEVER:
         return math.sqrt(NEW_RUN * law * NEW_RUN * law + file_std * file_std)
-    stribeck = STRIBECK * law * STRIBECK_SPEED / (STRIBECK_SPEED + speed)
+    slow, held = STRIBECK * law, state.rest.held / BAND_95
+    faster = speed / STRIBECK_SPEED * (speed / STRIBECK_SPEED)
+    stribeck = (held if held > slow else slow) / (1.0 + faster * faster)
+    untold = known.terms.viscous * (speed - state.fastest) if speed > state.fastest else 0.0
     std = known.friction_std * (law / known.friction if law > known.friction else 1.0)
     least = LEAST_STD * law
-    std = math.sqrt(std * std + stribeck * stribeck + unexplained_square)
+    std = math.sqrt(std * std + stribeck * stribeck + untold * untold + state.outlook.unexplained_square)
     return std if std > least else least
 
 

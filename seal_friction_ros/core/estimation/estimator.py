@@ -342,7 +342,7 @@ _NO_FRICTION = ActuatorFriction(0.0, 0.0, 0.0, True, 0.0, 0.0)
 _UNKNOWN = StateFriction(UNKNOWN, 0, 0.0)
 
 ZERO_MAX = 5.0  # [-] our choice: zero of a velocity sensor over stick_velocity; a slower rod may be at rest
-CREEP = 0.1  # [-] our choice: a rod in the band of rest is known to be at rest up to this share of stick_velocity
+CREEP = 0.1  # [-] our choice: a rod that moves against its force sum slides from this share of stick_velocity on
 SETTLING_TIME = 0.01  # [s] our choice: in this time the way of a sliding rod exceeds the ripple of its signal clearly
 SHORTEST_INTERVAL = 1e-3  # [s] our choice: over less, noise exceeds any rate, and some drivers stamp no finer
 
@@ -627,13 +627,14 @@ def assess_inputs(parameters: Any, state: EstimatorState, sample: RodSample) -> 
     if not fault:
         motion = condition_velocity(state.motion, stamp, sample.velocity, settings.velocity_resolution)
         at_rest = is_at_rest(motion.velocity, state.at_rest, settings.stick_velocity, settings.slip_velocity)
-        state.motion, state.at_rest, uncertain = motion, at_rest, _is_uncertain(settings, motion, at_rest)
-        if uncertain:
-            status |= BITS.MOTION_UNCERTAIN
+        state.motion, state.at_rest = motion, at_rest
         # Friction never drives: a rod in the band of rest that moves against the force sum slides; a load hides that.
         drives = motion.velocity * force_sum < 0.0 and not parameters.force_sum_correction.contains_load
-        if not at_rest or (uncertain and drives):
+        slides = not at_rest or (drives and abs(motion.velocity) > CREEP * settings.stick_velocity)
+        if slides:
             velocity = motion.velocity
+            if at_rest or _is_uncertain(settings, motion):
+                status |= BITS.MOTION_UNCERTAIN
     return Observation(stamp, velocity, force_sum, status, input_age)
 
 
@@ -661,11 +662,9 @@ def _unidentified_motion(limits: MotionLimits, velocity: float) -> int:
 
 
 @compilable
-def _is_uncertain(settings: EstimatorSettings, motion: ConditionedVelocity, at_rest: bool) -> bool:
-    """Whether the velocity does not tell if the rod is at rest."""
+def _is_uncertain(settings: EstimatorSettings, motion: ConditionedVelocity) -> bool:
+    """Whether the velocity of a rod that seems to slide does not tell if it is at rest."""
     velocity, half_width = motion.velocity, motion.half_width
-    if at_rest:
-        return abs(velocity) > CREEP * settings.stick_velocity
     if motion.samples < SETTLING:
         return True
     if half_width == 0.0:  # the first step of a motion may be a ripple that is not learnt yet

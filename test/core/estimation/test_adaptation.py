@@ -39,6 +39,7 @@ from seal_friction_ros.core.estimation.estimator import EstimatorParameters, Est
 from seal_friction_ros.core.estimation.friction_change import FrictionChange, watch
 from seal_friction_ros.core.estimation.friction_filter import NOT_BEGUN
 from seal_friction_ros.core.estimation.records import RodSample
+from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.friction.actuator import ActuatorFriction, MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
 from seal_friction_ros.core.friction.seal_file import parse_seal
@@ -227,6 +228,33 @@ def test_a_slow_rod_that_was_fast_may_be_at_rest_so_its_outliers_are_not_learnt_
     assert creeping.filter._replace(unexplained=taught.filter.unexplained) == taught.filter
     assert creeping.filter.unexplained.drift == pytest.approx(-learnt(taught).scale * 40.0, rel=0.05)
     assert creeping.outlook.most < 0.0
+
+
+def std_at(state, speed):
+    """Standard deviation of the friction of 40 N of a rod that slides [N]."""
+    by_file = ActuatorFriction(40.0, 2.0, 0.0, True, 0.0, 0.0)
+    return friction_of_sliding(SETTINGS, state, by_file, speed, True)[0].coulomb_friction_std
+
+
+def test_a_slow_rod_may_have_the_friction_that_a_rest_held():
+    taught = adapted(strokes(10.0, friction=40.0))
+    rest = moving(1.0, lambda _: 0.0, lambda _: 70.0, taught.stamp + SECOND // 100)
+    rested = adapted(rest, state=taught)
+    assert BAND_95 * std_at(rested, 0.0) > 30.0 > BAND_95 * std_at(taught, 0.0)
+    assert std_at(rested, 0.1) == pytest.approx(std_at(taught, 0.1), rel=0.05)
+
+
+def test_viscous_friction_of_slow_strokes_is_not_sure_at_a_higher_speed():
+    def side(time):
+        return 1.0 if int(time + 1e-9) % 2 == 0 else -1.0
+
+    def speed(time):
+        return 0.02 + 0.02 * (int(time / 2.0 + 1e-9) % 3)
+
+    taught = adapted(moving(24.0, lambda t: speed(t) * side(t), lambda t: (40.0 - 300.0 * speed(t)) * side(t)))
+    assert taught.filter.terms.viscous < -200.0
+    assert std_at(taught, 0.06) < 4.0
+    assert std_at(taught, 0.12) > 0.06 * 200.0
 
 
 def test_a_rod_that_turns_out_to_be_faster_forgets_what_its_slow_motion_taught_as_it_may_have_been_at_rest():
