@@ -50,7 +50,7 @@ class SealSelection:
         unit='',
         live=False,
         description='Seal file of each seal: a path, or the name of one in config/seals. NAME@CHAMBER names the '
-        f'chamber that it sees, too: {CHAMBERS_TEXT}. Without: as the seal file says.',
+        f'chamber that it sees, too: {CHAMBERS_TEXT}. Without @CHAMBER: as the seal file says.',
     )
     seal_chambers: tuple[str, ...] = parameter(
         MOUNTING,
