@@ -3,7 +3,16 @@
 from dataclasses import replace
 
 import pytest
-from system.elastic_seals import MOTIONS, PLANTS, estimate_errors, identified, on_random_motions, result, tracking
+from system.elastic_seals import (
+    MOTIONS,
+    PLANTS,
+    estimate_errors,
+    identified,
+    least_in_band,
+    on_random_motions,
+    result,
+    tracking,
+)
 
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.friction.presliding import Presliding
@@ -46,7 +55,7 @@ def test_the_fit_is_known():
 
 @pytest.mark.long  # `test_sheared_seals` has other structures
 def test_on_another_structure_the_estimate_follows_the_shear_and_status_0_is_a_promise():
-    wave, duration = MOTIONS[1]
+    wave, duration = MOTIONS['5 mm at 0.5 Hz']
     rigid, elastic = (estimate_errors(PLANTS['LuGre, 3e5 N/m'], model, wave, duration) for model in (None, FOUND))
     assert elastic.rms < 0.15 * rigid.rms
     assert elastic.in_band > 0.97
@@ -66,7 +75,7 @@ def test_a_heavy_load_does_not_break_the_promise():
 @pytest.mark.parametrize('plant', PLANTS)
 def test_on_every_plant_status_0_is_a_promise(plant):
     model = identified(PLANTS[plant]).presliding
-    for wave, duration in MOTIONS:
+    for wave, duration in MOTIONS.values():
         rigid, elastic = (estimate_errors(PLANTS[plant], seals, wave, duration) for seals in (None, model))
         assert elastic.rms < 0.6 * rigid.rms
         assert not elastic.in_band < 0.95  # NaN: no sample is good on soft seals and a short stroke
@@ -74,4 +83,4 @@ def test_on_every_plant_status_0_is_a_promise(plant):
 
 @pytest.mark.long
 def test_on_random_motions_of_heavy_and_light_loads_status_0_is_a_promise():
-    assert on_random_motions(12) > 0.95
+    assert least_in_band(on_random_motions(12)) > 95.0
