@@ -218,7 +218,8 @@ def estimates(name: str, motions: Sequence[str], mass: float) -> list[Row]:
     models, rows = {'rigid': None, 'elastic': identified(PLANTS[name]).presliding}, []
     for motion in motions:
         found = {words: estimate_errors(PLANTS[name], model, *MOTIONS[motion], mass) for words, model in models.items()}
-        rows.append({'plant': f'{name}; {motion}', **{words: _percent(errors) for words, errors in found.items()}})
+        plant = name if len(motions) == 1 else f'{name}; {motion}'
+        rows.append({'plant': plant, **{words: _percent(errors) for words, errors in found.items()}})
     return rows
 
 
