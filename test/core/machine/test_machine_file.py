@@ -128,7 +128,7 @@ def with_parts(**parts):
     return parse_machine(yaml.safe_load(BENCH) | parts, 'robot.yaml')
 
 
-def test_what_is_not_given_is_standard():
+def test_a_key_that_is_not_given_has_its_default():
     file = parsed(BENCH)
     assert (file.ambient_pressure, file.together) == (101_325.0, False)
     assert with_parts(answers='together').together

@@ -146,7 +146,7 @@ def test_a_yaml_file_as_deep_as_one_likes_is_exit_code_2_and_one_line(name: str,
         ('stiction: 0.724347', 'stiction: 2 mm', ['stiction', 'mm', 'not for a']),
     ],
 )
-def test_a_seal_that_makes_no_sense_is_exit_code_2_with_field_value_and_bound(
+def test_an_invalid_seal_is_exit_code_2_with_field_value_and_bound(
     old: str, new: str, words: list[str], tmp_path: Path, capsys
 ):
     seal = tmp_path / 'seal.yaml'
