@@ -240,7 +240,7 @@ class Estimator:
         if missing := [name for name in known[:3] if name not in columns]:
             raise ValueError(f'samples have no column {missing[0]}: there are {", ".join(columns) or "none"}')
         if len({column.shape for column in columns.values()}) > 1 or columns['time'].ndim != 1:
-            raise ValueError('samples: the columns are not of one length')
+            raise ValueError('samples: the columns differ in length')
         estimates, forces = [], []
         for row in zip(*(column.tolist() for column in columns.values()), strict=True):
             estimates.append(self.step(**dict(zip(columns, row, strict=True))))

@@ -46,7 +46,7 @@ class _UniqueKeyLoader(yaml.CSafeLoader):
         keys = Counter(str(key.value) for key, _ in node.value)
         duplicates = sorted(key for key, count in keys.items() if count > 1)
         if duplicates:
-            raise yaml.YAMLError(f'{", ".join(duplicates)} stands twice in one mapping')
+            raise yaml.YAMLError(f'{", ".join(duplicates)} appears twice in one mapping')
         return super().construct_mapping(node, deep)
 
 

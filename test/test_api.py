@@ -218,7 +218,10 @@ def test_report_writes_the_page_and_gives_its_numbers(tmp_path: Path):
         (Estimator, 'no seals: name a seal file'),
         (lambda: Estimator(SEAL, 'nowhere.yaml'), 'nowhere.yaml: No such file'),
         (lambda: Estimator(SEAL).over({'time': [0.0]}), 'samples have no column velocity'),
-        (lambda: Estimator(SEAL).over({'time': [0.0], 'velocity': [0.1, 0.2], 'pressure_a': [1.0]}), 'one length'),
+        (
+            lambda: Estimator(SEAL).over({'time': [0.0], 'velocity': [0.1, 0.2], 'pressure_a': [1.0]}),
+            'differ in length',
+        ),
         (lambda: Estimator(SEAL).step(math.nan, 0.1, 1e6), 'time = nan s is not finite'),
         (lambda: Estimator(SEAL).step(math.inf, 0.1, 1e6), 'time = inf s is not finite'),
         (lambda: load_seal(SEAL).friction('much', 0.1), 'could not convert string'),

@@ -300,6 +300,17 @@ def test_every_measured_figure_has_the_command_that_makes_it_with_commit_and_dat
                 assert (ROOT / script).is_file(), script
 
 
+def test_every_script_of_the_measured_figures_prints_json():
+    for script in {found['script'] for found in make_docs.COMMAND.finditer(make_docs.MEASURED_PAGE.read_text())}:
+        if script.endswith('.py'):
+            assert re.search(r'--json|parser_of\(', (ROOT / script).read_text()), script
+
+
+def test_readme_and_docs_have_at_most_38000_words():
+    pages = [ROOT / 'README.md', *(ROOT / 'docs').glob('*.md')]
+    assert sum(len(page.read_text().split()) for page in pages) <= 38_000
+
+
 def test_measuring_again_writes_table_commit_and_date_and_leaves_the_others(tmp_path: Path):
     bench = tmp_path / 'bench.py'
     bench.write_text('print(\'{"one": {"us": 1.2345, "deep": {"x": 2}}, "two": {"us": 3.0, "deep": {"x": [4, 5]}}}\')')

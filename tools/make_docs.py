@@ -354,6 +354,8 @@ def _figures(row: Mapping[str, Any], above: str = '') -> dict[str, Any]:
 def _cell(value: Any) -> str:
     if isinstance(value, list):
         return ', '.join(map(_cell, value))
+    if value is None:
+        return ''
     return f'{value:.3g}' if isinstance(value, float) else str(value)
 
 

@@ -17,7 +17,8 @@ from seal_friction_ros.nodes.graph_watch import full_name
 from seal_friction_ros.nodes.managed_node import message_class
 from seal_friction_ros.offline.bags.bag import BagError, BagWriter
 
-_OF_EVERY_NODE = ('/rosout', '/parameter_events', '/transition_event')
+_NO_INPUTS = ('/rosout', '/parameter_events', '/transition_event', '/diagnostics')
+"""Ends of the topics that say nothing of a machine, as of a node that still compiles."""
 
 
 class TopicRecorder(Node):
@@ -50,12 +51,12 @@ class TopicRecorder(Node):
         return found
 
     def _published(self, name: str, space: str) -> list[str]:
-        """Topics of a node but those that every node has."""
+        """Topics of a node that may be inputs."""
         try:
             topics = [topic for topic, _ in self.get_publisher_names_and_types_by_node(name, space)]
         except NodeNameNonExistentError:  # it has just gone
             return []
-        return [topic for topic in topics if not topic.endswith(_OF_EVERY_NODE)]
+        return [topic for topic in topics if not topic.endswith(_NO_INPUTS)]
 
     def _take(self, topic: str, kind: str, data: bytes) -> None:
         self.messages.append((topic, kind, time.time_ns(), data))
@@ -79,7 +80,7 @@ def record(node: TopicRecorder, seconds: float, wait: float, out: Path) -> int:
         heard = ', '.join(f'{topic} ({", ".join(kinds)})' for topic, kinds in node.get_topic_names_and_types())
         hint = 'start the drivers, check ROS_DOMAIN_ID'
         there = f'topics: {heard or "none"}; silent: {"; ".join(node.silent()) or "none"}'
-        raise BagError(f'no message of a known type within {wait:g} s: {hint}; {there}')
+        raise BagError(f'no message of a type that can be an input within {wait:g} s: {hint}; {there}')
     with BagWriter(out) as writer:
         for message in node.messages:
             writer.write(*message)

@@ -299,14 +299,14 @@ def test_the_wave_changes_while_it_runs_and_the_plant_does_not():
         ({'standard__reference': 'pose'}, 'joint_state, trajectory_point'),
     ],
 )
-def test_a_plant_without_sense_is_refused_with_the_reason(values, reason):
+def test_an_invalid_plant_is_refused_with_the_reason(values, reason):
     with stage(autostart=False) as s:
         refused = s.set(**values)
         assert not refused.successful
         assert reason in refused.reason
 
 
-def test_a_plant_without_sense_from_the_start_stays_unconfigured():
+def test_an_invalid_plant_from_the_start_stays_unconfigured():
     with stage({'controller.force_bandwidth': 50000.0}, autostart=False) as s:
         assert s.simulator.trigger_configure() != TransitionCallbackReturn.SUCCESS
         assert not s.simulator.configured

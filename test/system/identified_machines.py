@@ -6,7 +6,6 @@ recording has four supply pressures and two speeds, the second other speeds, pre
 by more than `MOST` times as much, its band holds less than 90 %, or is wider than three times the error.
 """
 
-import argparse
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
@@ -14,11 +13,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from harness.campaign import parser_of, tell
 from harness.identify_run import Run
 
 from seal_friction_ros.core.estimation.configuration import SealSelection
@@ -203,24 +201,20 @@ WAYS = {
 
 def main() -> int:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
-    parser.add_argument('--seed', type=int, default=1)
-    parser.add_argument('--only', default='')
-    parser.add_argument('--way', choices=WAYS, action='append')
-    options = parser.parse_args()
-    names = ('machine', 'kinds', 'least squares [%]', 'identify [%]', 'ratio', 'in band [%]', 'half width/RMS', 'law')
-    table, bad = Table(*names), 0
+    parser = parser_of(__doc__, seed=(1, 'of the simulation'))
+    parser.add_argument('--only', default='', help='machines with this in their name')
+    parser.add_argument('--way', choices=WAYS, action='append', help='one kind of seals, or several; default: both')
+    options, rows, bad = parser.parse_args(), [], 0
     for machine in (m for m in MACHINES if options.only in m.name):
+        row: dict[str, float | str] = {'machine': machine.name}
         for way in options.way or WAYS:
             with tempfile.TemporaryDirectory() as folder:
                 s = score(machine, WAYS[way], options.seed, Path(folder))
-            ratio = s.identify / s.squares
-            bad += not (ratio <= MOST and s.inside >= 0.9 and s.half_width <= 3.0)
-            table.add_row(
-                s.machine, way, f'{100 * s.squares:.2f}', f'{100 * s.identify:.2f}', f'{ratio:.2f}',
-                f'{100 * s.inside:.0f}', f'{s.half_width:.1f}', s.text[:60],
-            )  # fmt: skip
-    Console(width=170).print(table)
+            bad += not (s.identify / s.squares <= MOST and s.inside >= 0.9 and s.half_width <= 3.0)
+            row |= {'least squares': 100.0 * s.squares, f'{way}: identify': 100.0 * s.identify}
+            row |= {f'{way}: in band': 100.0 * s.inside, f'{way}: half width': s.half_width, f'{way}: law': s.text[:60]}
+        rows.append(row)
+    tell(rows, as_json=options.json)
     return 1 if bad else 0
 
 

@@ -7,13 +7,15 @@ first 0.5 mm after each reversal is compared with the force sum less the offset 
 residuals of the two directions, beyond 2 mm.
 """
 
-import argparse
 import sys
 import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.campaign import parser_of, tell
 
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.friction.states import FrictionState
@@ -103,19 +105,15 @@ def _run(*words: object) -> None:
 
 
 def main() -> int:
-    """Print a line for each seal."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
+    """Print a row for each seal."""
+    parser = parser_of(__doc__, mass=(MASS, 'of what moves [kg]; 0: unknown'))
     parser.add_argument('folder', type=Path, help='with the logs of the Delft rig')
-    parser.add_argument('--mass', type=float, default=MASS, help='of what moves [kg]; 0.0: unknown')
-    options = parser.parse_args()
+    options, rows = parser.parse_args(), {}
     with tempfile.TemporaryDirectory() as work:
         for number, (name, (learnt_on, used_on)) in enumerate(seal_pairs(options.folder).items()):
-            rigid, elastic = errors(Path(work) / str(number), learnt_on, used_on, options.mass)
-            print(
-                f'{name}: rigid {rigid.rms:.1f} N, status 0 in {rigid.good} of {rigid.samples} samples, '
-                f'{rigid.in_band} in the band; elastic {elastic.rms:.1f} N, {elastic.good}, {elastic.in_band}',
-                flush=True,
-            )
+            found = errors(Path(work) / str(number), learnt_on, used_on, options.mass)
+            rows[name] = {words: each._asdict() for words, each in zip(('rigid', 'elastic'), found, strict=True)}
+    tell(rows, as_json=options.json)
     return 0
 
 

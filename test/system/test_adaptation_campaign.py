@@ -5,7 +5,7 @@ from system.adaptation_campaign import simulated
 
 
 @pytest.mark.parametrize('kind', ['load steps', 'inertia', 'offset drift'])
-def test_what_is_not_friction_moves_the_scale_of_a_random_machine_by_less_than_5_percent(kind):
+def test_disturbances_move_the_scale_of_a_random_machine_by_less_than_5_percent(kind):
     assert max(simulated(kind, 45.0, seed)['worst'] for seed in range(100, 103)) < 0.05
 
 

@@ -81,7 +81,7 @@ def test_mutations_of_the_corpus_crash_no_reader(cases):
         ('unfinished', 'seal_friction recover'),
     ],
 )
-def test_what_a_file_claims_is_not_believed(name: str, reason: str | None):
+def test_the_size_that_a_file_claims_is_not_trusted(name: str, reason: str | None):
     if reason is None:
         assert len(list(read_messages(CORPUS / 'mcap' / name))) == 1
     else:

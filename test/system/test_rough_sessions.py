@@ -18,7 +18,7 @@ def test_rough_sessions_of_every_case_end_well(tmp_path, case):
     assert outcome.bags > 1
 
 
-def test_what_is_wrong_is_no_good_end():
+def test_an_error_is_not_a_good_end():
     good = Outcome(10, 0, 10, 1, [], [])
     assert good.is_good
     worse = [{'forces': 0}, {'not_finite': 1}, {'samples': 0}, {'differing': ['a: b']}, {'faults': ['traceback']}]

@@ -26,7 +26,7 @@ PLACEHOLDER = 'placeholder'
 """Seal file of the default configuration."""
 PLACEHOLDER_WARNING = (
     'the seals are the placeholder of the default configuration, not those of your machine, so they make no force: '
-    'name their seal files in the parameter seals'
+    'set seals to their seal files'
 )
 MOUNTING = ('mounting',)
 """Value of `SealSelection.seal_chambers`: the chambers are those in ``seals``, or else of the seal files."""
@@ -50,7 +50,7 @@ class SealSelection:
         unit='',
         live=False,
         description='Seal file of each seal: a path, or the name of one in config/seals. NAME@CHAMBER names the '
-        f'chamber that it sees, too: {CHAMBERS_TEXT}. Without: as the seal file says.',
+        f'chamber that it sees, too: {CHAMBERS_TEXT}. Without @CHAMBER: as the seal file says.',
     )
     seal_chambers: tuple[str, ...] = parameter(
         MOUNTING,

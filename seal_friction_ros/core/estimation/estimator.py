@@ -101,7 +101,8 @@ class EstimatorSettings:
         unit='m/s',
         lower=0.0,
         upper=1.0,
-        description='A sliding rod is at rest at this speed and below; a zero of the sensor may be 5 times as large.',
+        description='A sliding rod is at rest at this speed and below; up to 5 times it, the rod may be at rest (zero '
+        'error of the sensor).',
     )
     slip_velocity: float = parameter(
         2e-3, unit='m/s', lower=0.0, upper=1.0, description='A rod at rest slides above this speed.'
@@ -160,21 +161,21 @@ class EstimatorSettings:
         unit='Pa/s',
         lower=1.0,
         upper=1e15,
-        description='A pressure that changes faster is rejected at first.',
+        description='A pressure that changes faster is rejected until the next one confirms it.',
     )
     force_rate_max: float = parameter(
         1e8,
         unit='N/s',
         lower=1e-3,
         upper=1e15,
-        description='A force sum that changes faster is rejected at first.',
+        description='A force sum that changes faster is rejected until the next one confirms it.',
     )
     acceleration_max: float = parameter(
         1e3,
         unit='m/s^2',
         lower=1e-3,
         upper=1e9,
-        description='A velocity that changes faster is rejected at first.',
+        description='A velocity that changes faster is rejected until the next one confirms it.',
     )
 
     def __post_init__(self) -> None:

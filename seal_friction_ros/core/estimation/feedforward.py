@@ -96,11 +96,13 @@ class FeedForwardSettings:
     presliding_against_motion: bool = parameter(
         False,
         unit='',
-        description='With presliding: just after a reversal the force may act against the wanted motion, to hold the '
-        'push of the sheared seals.',
+        description='With presliding: just after a reversal the force may act against the wanted motion, to cancel '
+        'the push of the sheared seals.',
     )
     use_measured_velocity: bool = parameter(
-        False, unit='', description='From the rod instead of the reference; closes a loop, so it can limit-cycle.'
+        False,
+        unit='',
+        description='Velocity of the rod instead of that of the reference; closes a loop, so it can limit-cycle.',
     )
     slew_limit: float = parameter(5e4, unit='N/s', lower=1e-3, upper=1e9, description='Largest rate of the force.')
     force_limit: float = parameter(150.0, unit='N', lower=0.0, upper=1e6, description='Largest force.')
@@ -119,8 +121,8 @@ class FeedForwardSettings:
         unit='s',
         lower=0.0,
         upper=10.0,
-        description='Longest time from the sending of an input to its use; a later one, or one whose stamp is further '
-        'from its receipt than stamp_age_max, makes no force. 0: not checked.',
+        description='Longest time from the sending of an input to its use. A later input makes no force, nor one whose '
+        'stamp is further from its receipt than stamp_age_max. 0: not checked.',
     )
     fade_time: float = parameter(
         0.2, unit='s', lower=1e-3, upper=1.0, description='Time in which the force fades out, and back in.'

@@ -79,8 +79,8 @@ class RecordingOptions:
         unit='s',
         lower=0.0,
         upper=1e9,
-        description='Time between two snapshots of configuration and state in a bag, between which it can be replayed '
-        'by several workers; 0: only at its beginning. Of friction_estimator, from the next recording on.',
+        description='friction_estimator only: time between two snapshots of configuration and state in a bag, for '
+        'replay by several workers; 0: one at its beginning. A change acts on the next recording.',
     )
     record_free_space: int = parameter(
         1_000_000_000,
@@ -95,8 +95,8 @@ class RecordingOptions:
         unit='bytes',
         lower=0,
         upper=10**15,
-        description='Size of all bags of this node in record_directory, above which it deletes its oldest finished '
-        'ones; a new bag begins after each tenth of it. 0: keep all.',
+        description='Largest size of all bags of this node in record_directory: it deletes its oldest finished ones, '
+        'and begins a new bag after each tenth of this size. 0: keep all.',
     )
 
     def __post_init__(self) -> None:

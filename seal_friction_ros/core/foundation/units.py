@@ -63,7 +63,7 @@ def in_si(value: Any, unit: str, where: str, *, is_difference: bool = False) -> 
     if isinstance(value, str) and (found := number_and_unit(value)) is not None:
         number, name = found[0], found[1] or unit
         if name != unit and name not in others:
-            raise ValueError(f'{where}: unit {name!r} is none of a {QUANTITY_OF.get(unit, unit)}: {", ".join(others)}')
+            raise ValueError(f'{where}: unit {name!r} is not for a {QUANTITY_OF.get(unit, unit)}: {", ".join(others)}')
         zero = 0.0 if is_difference or not found[1] else ZEROS.get(name, 0.0)
         return zero + number * UNITS.get(name, 1.0)
     if isinstance(value, bool) or not isinstance(value, int | float):

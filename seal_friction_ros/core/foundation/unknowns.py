@@ -56,9 +56,7 @@ class Unknown:
         if first > (most := _MOST.get(self.kind, math.inf)):
             raise ValueError(f'{self.name}: {self.kind} = {first:g} is above {most:g}')
         if self.kind in ('relative_std', 'factor') and self.value <= 0.0:
-            raise ValueError(
-                f'{self.name} is {self.value:g} in the case: give it a range in the place of a {self.kind}'
-            )
+            raise ValueError(f'{self.name} is {self.value:g} in the case: give it a range instead of a {self.kind}')
 
     def at(self, share: FloatArray) -> FloatArray:
         """Values below which a ``share`` u of all lies, between 0 and 1 and neither of them."""

@@ -368,8 +368,8 @@ def fit_curves(curves: Sequence[ReversalCurve], names: Sequence[str], length: fl
     found, errors = _with_lag(samples, found, _standard_errors(found, samples), length)
     if not errors[0] < LARGEST_RELATIVE_STD or not _SOFTEST < 0.99 * math.exp(found.parameters[0]) < 0.98 * _STIFFEST:
         raise PreslidingRefusedError(
-            f'{", ".join(names)}: the reversals tell the stiffness of {math.exp(found.parameters[0]):.2g} N/m with a '
-            f'relative standard deviation of {errors[0]:.2g} only: record slower reversals, more of them, or a finer '
+            f'{", ".join(names)}: the stiffness by the reversals, {math.exp(found.parameters[0]):.2g} N/m, has a '
+            f'relative standard deviation of {errors[0]:.2g}: record slower reversals, more of them, or a finer '
             'position'
         )
     log_stiffness, exponent, excess, log_length, log_dwell = found.parameters[:_START_OF_LOGS].tolist()

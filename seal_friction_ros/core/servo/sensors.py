@@ -15,17 +15,19 @@ _BLOCK = 64  # samples whose random numbers are drawn at once: the cost of a blo
 class SensorSettings(CheckedParameters):
     """Errors of the sensors; the default is none."""
 
-    pressure_noise: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e7, description='Standard deviation, each.')
+    pressure_noise: float = parameter(
+        0.0, unit='Pa', lower=0.0, upper=1e7, description='Standard deviation of each pressure.'
+    )
     velocity_noise: float = parameter(0.0, unit='m/s', lower=0.0, upper=1.0, description='Standard deviation.')
     force_noise: float = parameter(0.0, unit='N', lower=0.0, upper=1e5, description='Standard deviation.')
     position_noise: float = parameter(0.0, unit='m', lower=0.0, upper=0.1, description='Standard deviation.')
     pressure_resolution: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e7, description='Step; 0: continuous.')
-    velocity_resolution: float = parameter(0.0, unit='m/s', lower=0.0, upper=1.0, description='Likewise.')
-    force_resolution: float = parameter(0.0, unit='N', lower=0.0, upper=1e5, description='Likewise.')
-    position_resolution: float = parameter(0.0, unit='m', lower=0.0, upper=0.1, description='Likewise.')
-    delay: float = parameter(0.0, unit='s', lower=0.0, upper=1.0, description='From the measurement to publication.')
+    velocity_resolution: float = parameter(0.0, unit='m/s', lower=0.0, upper=1.0, description='Step; 0: continuous.')
+    force_resolution: float = parameter(0.0, unit='N', lower=0.0, upper=1e5, description='Step; 0: continuous.')
+    position_resolution: float = parameter(0.0, unit='m', lower=0.0, upper=0.1, description='Step; 0: continuous.')
+    delay: float = parameter(0.0, unit='s', lower=0.0, upper=1.0, description='Time from measurement to publication.')
     drop_out: float = parameter(0.0, unit='1', lower=0.0, upper=1.0, description='Share of lost samples, each sensor.')
-    seed: int = parameter(0, unit='', lower=0, upper=2**31 - 1, description='Of the random numbers.')
+    seed: int = parameter(0, unit='', lower=0, upper=2**31 - 1, description='Seed of the random numbers.')
 
     def reading(self, quantity: str, true: float, random: float) -> float:
         """Value of a sensor for a true value and a standard normal random number."""

@@ -15,12 +15,20 @@ FORCE_MARGIN = 1.5  # force limit over the largest friction found (our choice)
 class TuningSettings(CheckedParameters):
     """Task of a simulated axis, and the errors of its model."""
 
-    amplitude: float = parameter(0.001, unit='m', lower=1e-6, upper=1.0, description='Of the sine, half peak to peak.')
-    frequency: float = parameter(5.0, unit='Hz', lower=0.05, upper=50.0, description='Of the sine.')
-    delay: float = parameter(
-        0.001, unit='s', lower=0.0, upper=0.1, description='From velocity sample to its feed-forward in the controller.'
+    amplitude: float = parameter(
+        0.001, unit='m', lower=1e-6, upper=1.0, description='Amplitude of the sine, half peak to peak.'
     )
-    friction_error: float = parameter(0.3, unit='1', lower=0.0, upper=0.9, description='Largest relative model error.')
+    frequency: float = parameter(5.0, unit='Hz', lower=0.05, upper=50.0, description='Frequency of the sine.')
+    delay: float = parameter(
+        0.001,
+        unit='s',
+        lower=0.0,
+        upper=0.1,
+        description='Time from velocity sample to its feed-forward in the controller.',
+    )
+    friction_error: float = parameter(
+        0.3, unit='1', lower=0.0, upper=0.9, description='Largest relative error of the friction model.'
+    )
     delay_error: float = parameter(
         0.2, unit='1', lower=0.0, upper=1.0, description='Largest relative error of the delay to force on the rod.'
     )
@@ -33,11 +41,11 @@ class TuningSettings(CheckedParameters):
     pressure_noise: float = parameter(
         2e3, unit='Pa', lower=0.0, upper=1e6, description='Standard deviation of the noise of each pressure.'
     )
-    force_noise: float = parameter(1.0, unit='N', lower=0.0, upper=1e4, description='Likewise of the force sum.')
+    force_noise: float = parameter(1.0, unit='N', lower=0.0, upper=1e4, description='The same for the force sum.')
     velocity_noise: float = parameter(
-        2e-4, unit='m/s', lower=0.0, upper=1.0, description='Likewise of the velocity; only the estimator sees it.'
+        2e-4, unit='m/s', lower=0.0, upper=1.0, description='The same for the velocity; only the estimator sees it.'
     )
-    seed: int = parameter(1, unit='', lower=0, upper=2**31 - 1, description='Of the noise.')
+    seed: int = parameter(1, unit='', lower=0, upper=2**31 - 1, description='Seed of the noise.')
 
 
 @dataclass(frozen=True)
@@ -46,12 +54,24 @@ class RecordedAxisSettings(CheckedParameters):
 
     mass: float = parameter(0.0, unit='kg', lower=0.0, upper=1e6, description='Moving mass; 0: fitted.')
     whole_delay: float = parameter(
-        0.0, unit='s', lower=0.0, upper=0.5, description='From a velocity sample to force on the rod; 0: unknown.'
+        0.0,
+        unit='s',
+        lower=0.0,
+        upper=0.5,
+        description='Time from a velocity sample to the force on the rod; 0: unknown.',
     )
-    friction_error: float = parameter(0.3, unit='1', lower=0.0, upper=0.9, description='Largest relative model error.')
-    delay_error: float = parameter(0.2, unit='1', lower=0.0, upper=1.0, description='Likewise of the whole delay.')
-    area_a: float = parameter(0.0, unit='m2', lower=0.0, upper=10.0, description='Of chamber a, for --command-topic.')
-    area_b: float = parameter(0.0, unit='m2', lower=0.0, upper=10.0, description='Of chamber b, for --command-topic.')
+    friction_error: float = parameter(
+        0.3, unit='1', lower=0.0, upper=0.9, description='Largest relative error of the friction model.'
+    )
+    delay_error: float = parameter(
+        0.2, unit='1', lower=0.0, upper=1.0, description='Largest relative error of the whole delay.'
+    )
+    area_a: float = parameter(
+        0.0, unit='m2', lower=0.0, upper=10.0, description='Area of chamber a, for --command-topic.'
+    )
+    area_b: float = parameter(
+        0.0, unit='m2', lower=0.0, upper=10.0, description='Area of chamber b, for --command-topic.'
+    )
 
 
 class Outcome(Protocol):

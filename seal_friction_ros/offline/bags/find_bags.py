@@ -23,7 +23,9 @@ def find_bags(where: Path) -> list[Place]:
     for bag in found:
         known.setdefault(bag if isinstance(bag, str) else os.path.realpath(bag), bag)
     if not known:
-        raise ValueError(f'{where}: no bag in it: give a folder with bags below it, or a text file with a path a line')
+        raise ValueError(
+            f'{where}: no bag in it: give a folder with bags below it, or a text file with one path a line'
+        )
     return list(known.values())
 
 

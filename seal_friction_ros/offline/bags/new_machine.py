@@ -120,7 +120,7 @@ def recorded_topics(seconds: float, wait: float) -> Iterator[tuple[Path, list[st
     The bag is gone after the ``with`` block.
 
     Another process listens, so that this one needs no ROS. It waits ``wait`` [s] at most for the first message.
-    BagError if ROS 2 is not installed, or no topic of a known type has a message.
+    BagError if ROS 2 is not installed, or no topic that can be an input has a message.
     """
     if find_spec('rclpy') is None:
         raise BagError('--from-topics needs ROS 2: source your distribution, or run make setup; or use --from-bag')

@@ -132,7 +132,7 @@ def add_target(parser: argparse.ArgumentParser, option: str, kind: Kind, **optio
     """Add an option for a file or bag that the command writes; the first one adds ``--force``."""
     targets = parser.get_default('targets')
     if not targets:
-        parser.add_argument('--force', action='store_true', help='overwrite what this command did not make')
+        parser.add_argument('--force', action='store_true', help='overwrite files that this command did not make, too')
     action = parser.add_argument(option, type=Path, **options)
     parser.set_defaults(targets={**targets, action.dest: kind})
 
@@ -179,7 +179,9 @@ def add_workers(parser: argparse.ArgumentParser, what: str) -> None:
     group.add_argument('--workers', '--jobs', type=at_least(1), metavar='N', help=text)
     group.add_argument('--scheduler', metavar='ADDRESS', help='compute on the Dask cluster with this scheduler')
     files = ('CA', 'CERT', 'KEY')
-    parser.add_argument('--scheduler-tls', type=Path, nargs=3, metavar=files, help='its certificates, PEM files')
+    parser.add_argument(
+        '--scheduler-tls', type=Path, nargs=3, metavar=files, help='certificates for the scheduler, PEM files'
+    )
 
 
 def workers_of(arguments: argparse.Namespace) -> 'Workers':
@@ -315,10 +317,13 @@ def at_least(least: int) -> Callable[[str], int]:
     return whole_number
 
 
-_SAMPLES = 'quantiles from so many samples of what the case says is unknown'
+_SAMPLES = 'quantiles from N samples of what the case lists as unknown'
 _SHARED: dict[str, tuple[str, Settings]] = {
     'bags': ('path, or URL of fsspec', {'type': place, 'nargs': '+', 'metavar': 'BAG'}),
-    '--namespace': ('use only topics below it; of a machine the name of an actuator', {'default': ''}),
+    '--namespace': (
+        'use only the topics below this namespace; with several actuators, the name of one',
+        {'default': ''},
+    ),
     '--params': ('ROS parameter file of the estimator', {'type': Path, 'metavar': 'FILE'}),
     '--work': ('keep finished parts in this folder, and resume from them', {'type': Path, 'metavar': 'FOLDER'}),
     '--retry-failed': ('with --work: try again what failed before', {'action': 'store_true'}),

@@ -17,7 +17,7 @@ def add_parser(commands: Any) -> None:
     description = 'show how friction, offset and starts of the seals change over bags'
     example = 'health monday tuesday wednesday --out health.html'
     health = cli.add_command(commands, 'health', run_health, description, example)
-    description = 'show which seal drifts, which rig disagrees, which recording is damaged, of many bags'
+    description = 'show over many bags which seal drifts, which rig disagrees and which recording is damaged'
     example = 'fleet bags.txt --out fleet.html --parquet fleet.parquet --work build/fleet --scheduler tcp://HOST:8786'
     fleet = cli.add_command(commands, 'fleet', run_fleet, description, 'fleet bags --out fleet.html', example)
     description = 'learn the friction of today from bags and save it as a seal file'
@@ -44,8 +44,11 @@ def add_parser(commands: Any) -> None:
 _LIMITS: dict[str, tuple[str, cli.Settings]] = {
     '--scale-low': ('alarm below this scale (0.6)', {'type': cli.non_negative, 'default': 0.6}),
     '--scale-high': ('alarm above this scale (1.5)', {'type': cli.non_negative, 'default': 1.5}),
-    '--breakaway': ('alarm above this start (2.5)', {'type': cli.non_negative, 'default': 2.5}),
-    '--noise': ('alarm above this share of residual (0.3)', {'type': cli.non_negative, 'default': 0.3}),
+    '--breakaway': (
+        'alarm above this starting force over the friction (2.5)',
+        {'type': cli.non_negative, 'default': 2.5},
+    ),
+    '--noise': ('alarm above this residual over the friction (0.3)', {'type': cli.non_negative, 'default': 0.3}),
 }
 
 

@@ -55,7 +55,7 @@ def _kind(text: str) -> tuple[str, tuple[str, ...]]:
 _FLAG = {'action': 'store_true'}
 _SHARE = {'type': cli.non_negative, 'metavar': 'SHARE'}
 _ONE_KIND = 'one of several kinds of seals in the cylinder and what each of its seals sees; one file a kind'
-_KIND_ERROR = 'standard error of a kind up to which it is told from the others, a share of its friction (0.1)'
+_KIND_ERROR = 'largest standard error of the friction of a kind that is accepted, a share of that friction (0.1)'
 _CHANGED = 'refuse sources whose friction differs by more than 15 %% instead of fitting them together'
 _WHAT_IS_KNOWN: dict[str, tuple[str, cli.Settings]] = {
     '--squeeze-force': ('normal force from the geometry, even if --seal has one', _FLAG),

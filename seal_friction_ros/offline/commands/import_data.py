@@ -39,7 +39,7 @@ def add_parser(commands: Any) -> None:
     thesis = cli.add_command(sources, 'thesis', run_thesis, description, 'import thesis --out pull_test')
     cli.add_target(thesis, '--out', BAG, required=True, metavar='BAG', help='bag to make')
     for source, what in ((log, 'logs'), (bag, 'bags')):
-        help_text = f'bag to make; of several {what} a folder with a bag each, by their names'
+        help_text = f'bag to make; for several {what} the folder of the bags, one named after each'
         cli.add_target(source, '--out', BAG, required=True, metavar='BAG', help=help_text)
         cli.add_workers(source, what)
         cli.add_shared(source, '--work', '--retry-failed')

@@ -18,7 +18,7 @@ def add_parser(commands: Any) -> None:
     text = 'x_ring, u_cup, capped_ring, circle, or the outline in a file: CSV (r [mm], z [mm]) or DXF'
     parser.add_argument('drawing', metavar='SHAPE|FILE', help=text)
     cli.add_options(parser, _OPTIONS)
-    parser.add_argument('--mirrored', action='store_true', help='turn the inside of the section out')
+    parser.add_argument('--mirrored', action='store_true', help='swap the inner and the outer side of the section')
     metavar = 'PRESSURE,SPEED,FRICTION'
     reading = cli.quantities('Pa', 'm/s', 'N')
     text = 'measured sliding friction of one seal, in SI or with units; repeat it for several'

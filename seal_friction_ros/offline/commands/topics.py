@@ -27,7 +27,7 @@ def add_parser(commands: Any) -> None:
         step.add_argument('topic', help='name of the topic')
         text = 'time to listen, 5 s unless given' if step is rate else 'time to listen at most; default: until Ctrl-C'
         step.add_argument('--seconds', type=cli.positive, default=5.0 if step is rate else None, help=text)
-    shown.add_argument('--count', type=cli.at_least(1), metavar='N', help='end after so many messages')
+    shown.add_argument('--count', type=cli.at_least(1), metavar='N', help='end after N messages')
     parameter.add_argument('node', help='name of the node')
     parameter.add_argument('name', nargs='?', help='parameter; default: list all')
     parameter.add_argument('value', nargs='?', help='value to set, as in YAML')

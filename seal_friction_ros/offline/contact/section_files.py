@@ -93,7 +93,7 @@ def _columns(path: Path, wanted: Mapping[str, str]) -> FloatArray:
 def _size(unit: str, quantity: str) -> float:
     """Size in SI of a unit of a quantity."""
     if QUANTITY_OF.get(unit) != quantity:
-        raise ValueError(f'unit {unit!r} is none of a {quantity}: {", ".join(QUANTITIES[quantity])}')
+        raise ValueError(f'unit {unit!r} is not for a {quantity}: {", ".join(QUANTITIES[quantity])}')
     return unit_size(unit)
 
 

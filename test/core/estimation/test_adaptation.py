@@ -368,7 +368,7 @@ def test_strokes_before_and_after_a_gap_are_not_compared():
 
 @pytest.mark.parametrize('mode', ['observe', 'on'])
 @pytest.mark.parametrize('what', ['friction', 'load', 'spring'])
-def test_what_drifts_in_one_direction_alone_is_in_the_band_or_said(what, mode):
+def test_a_drift_in_one_direction_alone_is_in_the_band_or_marked(what, mode):
     day = {
         'friction': replace(DAY, one_direction=True, scale=lambda time: 1.0 + 0.05 * time),
         'load': replace(DAY, one_direction=True, load=lambda time: 0.05 * FRICTION * time),
@@ -406,7 +406,7 @@ def part_of_stroke(time: float) -> float:
 @pytest.mark.parametrize(
     'name', ['load steps', 'a load step at a reversal', 'offset drift', 'gravity', 'inertia', 'noise', 'spikes']
 )
-def test_what_is_not_friction_moves_the_friction_by_less_than_5_percent_or_is_said(name, seed):
+def test_disturbances_move_the_friction_by_less_than_5_percent_or_are_marked(name, seed):
     day = {
         'load steps': replace(DAY, load=lambda time: 2.0 * FRICTION * (int(time / 7.3) % 2)),
         'a load step at a reversal': replace(DAY, load=lambda time: 3.0 * FRICTION * (time > 15.0)),
@@ -463,7 +463,7 @@ def test_the_friction_of_each_direction_lies_in_the_band_where_it_differs_by_dir
                 assert estimate.status or abs(estimate.friction_force - true) < 1.96 * estimate.coulomb_friction_std
 
 
-def test_nobody_knows_a_friction_to_less_than_1_percent():
+def test_the_standard_deviation_of_a_friction_is_at_least_1_percent():
     state = adapted(strokes(10.0))
     certain = learnt_state(state, SETTINGS, filter=state.filter._replace(friction_std=0.0))
     friction, _, _ = friction_of_sliding(SETTINGS, certain, LAW_AT_40, 1.0, True)

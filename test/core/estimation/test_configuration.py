@@ -224,7 +224,7 @@ def test_an_estimator_taken_up_from_a_snapshot_goes_on_as_if_never_stopped():
 
 
 @pytest.mark.parametrize('recorded', [None, Recorded(None), Recorded(FeedForwardSettings(scale=0.5))])
-def test_what_acted_in_the_recording_comes_back(recorded):
+def test_the_force_that_acted_in_the_recording_is_read_back(recorded):
     snapshot = Snapshot(CONFIGURATION, init(CONFIGURATION.parameters()), recorded=recorded)
     assert parse_snapshot(snapshot_text(snapshot)).recorded == recorded
 
@@ -285,7 +285,7 @@ def test_one_parameter_holds_seals_and_chambers_and_the_earlier_two_mean_the_sam
         ({'seals': ('x@a', 'y@c')}, "'c' is not a, b, difference or ambient"),
     ],
 )
-def test_a_selection_that_makes_no_sense_is_refused(change, complaint):
+def test_an_invalid_selection_is_refused(change, complaint):
     with pytest.raises(ValueError, match=complaint):
         SealSelection(**change)
 

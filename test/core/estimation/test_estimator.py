@@ -517,7 +517,7 @@ def test_input_age_is_that_of_the_value_in_use_not_of_the_unusable_newest():
         ({'force_max': 0.5}, 'force_max = 0.5 N is below its lower bound 1.0 N'),
     ],
 )
-def test_settings_that_make_no_sense_are_refused_with_field_value_and_bound(change, complaint):
+def test_invalid_settings_are_refused_with_field_value_and_bound(change, complaint):
     with pytest.raises(ValueError, match=f'^EstimatorSettings.{complaint}'):
         EstimatorSettings(**change)
 
@@ -638,7 +638,7 @@ def test_a_direction_in_which_a_seal_was_never_measured_is_marked_while_the_rod_
         assert marked == [0, 0, Status.DIRECTION_NOT_IDENTIFIED]
 
 
-def test_what_one_seal_was_not_measured_in_the_actuator_was_not():
+def test_a_motion_that_one_seal_was_not_measured_in_is_marked_for_the_actuator():
     marks = statuses([0.05], IdentifiedMotion(0.1, 0.2), IdentifiedMotion(0.01, 0.02, (-1,)))
     assert marks == [Status.SLOWER_THAN_IDENTIFIED | Status.FASTER_THAN_IDENTIFIED | Status.DIRECTION_NOT_IDENTIFIED]
 
@@ -848,7 +848,7 @@ def test_without_a_usable_force_sum_no_swing_is_judged():
     assert step(PARAMETERS, state, sample(START + MS))[0].swing != state.swing
 
 
-def test_what_one_seal_depends_on_the_actuator_does():
+def test_the_actuator_depends_on_what_any_of_its_seals_depends_on():
     plain = with_seals({}, {})
     assert (plain.depends_on_velocity, plain.limits_motion, plain.corrects_force_sum) == (False, False, False)
     assert with_seals({'velocity_terms': VelocityTerms(100.0)}, {}).depends_on_velocity

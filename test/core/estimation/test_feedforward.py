@@ -51,7 +51,7 @@ def test_without_a_scale_there_is_no_force():
     assert [row.force for row in rows] == [0.0] * 10
 
 
-def test_share_of_the_friction_in_the_direction_of_the_wanted_velocity():
+def test_the_force_is_a_share_of_the_friction_in_the_direction_of_the_wanted_velocity():
     for velocity in (0.1, -0.1):
         _, rows = run(SHARP, 3, velocity=velocity)
         assert rows[-1].force == pytest.approx(math.copysign(0.9 * 42.0, velocity))
@@ -77,7 +77,7 @@ def test_scale_0_is_0_newton_at_once():
 
 
 @given(st.floats(-1.0, 1.0))
-def test_smooth_through_zero(velocity):
+def test_the_force_passes_zero_smoothly(velocity):
     steepest = 0.9 * 42.0 / SHARP.smoothing_velocity
     change = compensation(SHARP, 42.0, velocity + 1e-6) - compensation(SHARP, 42.0, velocity)
     assert abs(change) <= 1.001e-6 * steepest

@@ -386,7 +386,7 @@ def test_one_direction_alone_tells_no_friction():
     assert found.friction_std > PROVEN * machine.frictions[0]
 
 
-def test_one_speed_leaves_viscous_friction_as_it_was_believed():
+def test_one_speed_leaves_viscous_friction_at_its_prior():
     machine = Machine(LAW._replace(viscous=60.0))
     begun, found = after(list(readings(machine, 60.0))[:1]), after(readings(machine, 60.0))
     assert magnitude(found, machine, 1) == pytest.approx(true_magnitude(machine, 1), rel=0.03)

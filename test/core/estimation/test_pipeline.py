@@ -84,7 +84,7 @@ def run(messages, parameters=PARAMETERS, times=None):
     return answers
 
 
-def test_nobody_waits_for_what_is_learnt_from_a_sample(monkeypatch):
+def test_an_estimate_is_published_before_its_sample_is_learnt_from(monkeypatch):
     """The estimate goes out before anything is learnt from its sample, which takes nearly as long as the estimate."""
     order = []
 

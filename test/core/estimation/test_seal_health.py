@@ -242,7 +242,7 @@ def test_what_is_not_known_is_said_to_be_unknown():
     assert (told['starts after a rest'], told['reversals learnt from'], told['changes of the friction']) == ('0',) * 3
 
 
-def test_what_is_known_is_told_in_its_unit():
+def test_health_values_are_shown_in_their_units():
     known: FrictionFilter = NOT_BEGUN._replace(
         stamp=3_000 * MS,
         terms=Terms(1.0, 8.0, 40.0, 0.0, -5.0, 2.0, 0.7, 0.0),

@@ -236,7 +236,7 @@ def test_a_temperature_that_no_rubber_has_is_no_sample(celsius):
     assert known.kelvin == pytest.approx(323.15)
 
 
-def test_a_single_wrong_temperature_is_never_believed():
+def test_a_single_wrong_temperature_is_never_used():
     for wrong in range(6):
         run = Run(WARM)
         for number in range(6):

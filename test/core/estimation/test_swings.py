@@ -81,7 +81,7 @@ def test_a_rod_that_slides_on_while_its_velocity_hums_is_uncertain():
     assert np.mean([e.status == 0 and e.friction_force < 0.0 for e in found]) < 0.01
 
 
-def test_what_hums_is_not_learnt():
+def test_a_hum_is_not_learnt_from():
     parameters = EstimatorParameters(EstimatorSettings(), SEALS, AdaptationSettings('on'))
     last = estimates(hum(20.0, 0.02), np.full_like(TIME, 10.0), parameters)[-1]
     assert (last.adaptation_scale, last.adaptation_offset) == (1.0, 0.0)

@@ -225,7 +225,7 @@ def test_another_text_is_no_number(text):
 
 
 def test_a_unit_of_another_quantity_is_refused_and_a_length_that_fits_in_millimetres_gets_a_hint():
-    with pytest.raises(ValueError, match=r"^spring\.stiffness: unit 'N' is none of a stiffness: N/m, N/mm, kN/m$"):
+    with pytest.raises(ValueError, match=r"^spring\.stiffness: unit 'N' is not for a stiffness: N/m, N/mm, kN/m$"):
         make(stiffness='1e5 N')
     geometry = {'section_diameter': 2.6e-3, 'ring_inner_diameter': 0.06, 'rod_diameter': 0.06}
     with pytest.raises(ValueError, match=r'gland_diameter = 63\.0 m is above .* 10\.0 m; if it is in mm, write 63 mm$'):

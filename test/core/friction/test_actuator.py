@@ -125,7 +125,7 @@ def test_prior_art_adds_a_squeeze_part_per_length_and_a_pressure_part_per_area()
         ((1e5,), 'as many ordinates'),
     ],
 )
-def test_a_chart_that_makes_no_sense_is_refused(frictions, complaint):
+def test_an_invalid_chart_is_refused(frictions, complaint):
     with pytest.raises(ValueError, match=f'^PriorArtChart.*{complaint}'):
         PriorArtChart(GEOMETRY, 100.0, (0.0, 1e6), frictions)
 
@@ -300,7 +300,7 @@ def test_one_seal_outside_its_range_is_enough(a, b, inside):
     assert actuator_friction((on('a'), on('b')), a, b).in_identified_range is inside
 
 
-def test_a_chamber_without_a_seal_has_no_say_in_the_range():
+def test_a_chamber_without_a_seal_does_not_limit_the_range():
     assert actuator_friction((on('a'),), 5e6, 9e9).in_identified_range
 
 

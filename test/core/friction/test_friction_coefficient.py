@@ -85,7 +85,7 @@ def test_a_falling_table_falls_everywhere(a, b):
         ((1.0, math.nan), (0.3, 0.2), '(not every point is|is not) finite'),
     ],
 )
-def test_a_table_that_makes_no_sense_is_refused(normal, coefficients, complaint):
+def test_an_invalid_table_is_refused(normal, coefficients, complaint):
     with pytest.raises(ValueError, match=f'^CoefficientTable.*{complaint}'):
         CoefficientTable(normal, coefficients)
 

@@ -7,7 +7,7 @@ import pytest
 from seal_friction_ros.core.friction.identified_motion import ANY_MOTION, IdentifiedMotion, motion_limits
 
 
-def test_what_one_seal_was_not_measured_in_the_actuator_was_not():
+def test_a_motion_that_one_seal_was_not_measured_in_is_marked_for_the_actuator():
     both = motion_limits([IdentifiedMotion(0.02, 0.5), IdentifiedMotion(0.01, 0.2, (1,))])
     assert both == (pytest.approx(0.018), pytest.approx(0.22), True, False)
     other = motion_limits([IdentifiedMotion(0.0, 0.2, (-1,)), IdentifiedMotion(0.01, 0.5)])

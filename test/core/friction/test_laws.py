@@ -188,7 +188,7 @@ def test_a_law_alone_is_a_seal_without_anything_else():
 # --- laws that need no geometry ---
 
 
-def test_power_of_the_pressure_in_bar():
+def test_the_power_law_takes_the_pressure_in_bar():
     assert PressurePowerLaw(3.0, 0.4, 0.5).coulomb_friction(4e5) == pytest.approx(3.8)
     assert PressurePowerLaw(3.0, 0.4, 0.5).coulomb_friction(0.0) == 3.0
 

@@ -51,7 +51,7 @@ def test_normal_force_never_falls_with_pressure(law, a, b):
         ((0.0, 1.0), (1.0, 2.0, 3.0), 'as many ordinates'),
     ],
 )
-def test_a_table_that_makes_no_sense_is_refused(pressures_, forces, complaint):
+def test_an_invalid_table_is_refused(pressures_, forces, complaint):
     with pytest.raises(ValueError, match=f'^NormalForceTable.*{complaint}'):
         NormalForceTable(pressures_, forces)
 

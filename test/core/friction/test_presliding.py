@@ -315,7 +315,7 @@ class TestExcess:
 
 class TestHysteresis:
     @given(preslidings, st.lists(st.floats(-1.0, 1.0), min_size=2, max_size=12))
-    def test_rate_independent_to_the_bit(self, seal, turns):
+    def test_shear_is_independent_of_the_rate_to_the_bit(self, seal, turns):
         numbers = presliding_numbers([seal])
         slow, fast = NOT_SHEARED, NOT_SHEARED
         for turn in turns:

@@ -119,7 +119,7 @@ def test_laws_that_need_no_geometry_do_without_it():
     assert 'squeeze' in complaint(changed(BY_PRESSURE, 'geometry', {**POWER['geometry'], 'section_diameter': 1e-3}))
 
 
-def test_what_a_sliding_seal_has_besides_its_coulomb_friction():
+def test_velocity_terms_are_added_to_coulomb_friction():
     terms = {'viscous_friction': 100.0, 'stribeck_friction': 3.0, 'stribeck_velocity': 0.02, 'asymmetry': 0.1}
     seal = parse_seal({**CONSTANT, 'velocity_terms': terms})
     out, back = (actuator_friction((MountedSeal(seal, 'a'),), 1e6, 0.0, v).velocity_friction for v in (0.02, -0.02))
@@ -287,7 +287,7 @@ def test_the_identified_range_is_two_pressures(value):
         (['0', 1e6], "pressure_min = '0' is not a number"),
     ],
 )
-def test_an_identified_range_that_makes_no_sense_is_refused(value, expected):
+def test_an_invalid_identified_range_is_refused(value, expected):
     assert expected in complaint(changed(POWER, 'identified_pressure', value))
 
 

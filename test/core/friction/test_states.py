@@ -165,7 +165,7 @@ def test_rest_does_not_know_left_from_right(velocity, was, a, b):
 
 
 @given(st.floats(-10.0, 10.0), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
-def test_what_was_at_rest_rests_at_least_as_easily(velocity, a, b):
+def test_a_rod_at_rest_stays_at_rest_at_any_speed_at_which_a_sliding_rod_would_rest(velocity, a, b):
     stick, slip = sorted((a, b))
     assert is_at_rest(velocity, True, stick, slip) >= is_at_rest(velocity, False, stick, slip)
 

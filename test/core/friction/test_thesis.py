@@ -154,7 +154,7 @@ def line():
     return AreaDeformationGain(*linear_regression(*forces))
 
 
-def test_area_deformation_gain_and_intercept_of_table_4():
+def test_area_deformation_gain_and_intercept_are_those_of_table_4():
     assert line().area_deformation_gain == pytest.approx(0.3925, abs=5e-5)
     assert line().radial_force / LBF == pytest.approx(2.09, abs=0.005)
 

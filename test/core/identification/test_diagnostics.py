@@ -139,7 +139,7 @@ def test_an_outlier_is_so_many_standard_errors_of_a_new_pressure_from_the_law_of
     assert outlying_level([CONSTANT], readings.taken(readings.level > 0)) is None  # of three pressures none
 
 
-def test_what_the_other_pressures_scatter_by_counts_as_noise():
+def test_the_scatter_at_the_other_pressures_counts_as_noise():
     frictions = np.array([18.0, 22.0, 21.0, 19.0, 40.0])
     found = outlying_level([CONSTANT], made([10, 20, 30, 40, 50], frictions))
     others = frictions[:4]

@@ -292,7 +292,7 @@ def test_the_band_reaches_to_the_95th_percentile_counted_for_one_more_reading(re
         assert half == pytest.approx(0.1 * rank * np.sqrt(1.0 + 1.0 / groups))
 
 
-def test_what_the_data_cannot_show_is_added_in_square():
+def test_unobserved_deviations_are_added_in_square():
     friction, deviation = np.full(100, 10.0), np.tile([0.3, -0.3], 50)
     alone, more = prediction_uncertainty(friction, deviation, 3), prediction_uncertainty(friction, deviation, 3, 0.12)
     assert more.std(friction)[0] == pytest.approx(np.hypot(alone.std(friction)[0], 1.2))

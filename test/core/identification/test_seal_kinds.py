@@ -134,7 +134,7 @@ def test_errors_of_the_areas_are_found_and_only_such_as_are_there():
     assert not right_areas(cylinder(noise=0.01, areas=(0.0, 0.0)))[1].is_significant
 
 
-def test_what_no_pressure_divides_is_divided_with_its_standard_deviation(exact):
+def test_friction_that_no_pressure_divides_is_divided_with_its_standard_deviation(exact):
     _, found, told = exact
     share = found.model.division
     undivided = CONSTANT + VISCOUS * 0.04

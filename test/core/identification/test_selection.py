@@ -225,7 +225,7 @@ def fitted(condition=2.0, **values):
         ({'pressure_exponent': 0.0501}, ''),
     ],
 )
-def test_parameters_at_a_bound_are_not_believed_but_one_that_is_nothing(values, reason):
+def test_parameters_at_a_bound_are_unsound_unless_the_bound_is_zero(values, reason):
     assert fitted(**values).why_unsound == reason
 
 

@@ -314,7 +314,7 @@ def test_a_vented_chamber_stands_at_the_pressure_of_the_air_and_is_not_clipped(a
     assert (clipped_share(swinging, low_is_real=is_ambient(ambient)) > 0.0) is clipped
 
 
-def test_longest_stretch():
+def test_the_longest_stretch_is_found_with_its_start_and_length():
     assert longest_stretch(np.array([0, 1, 0, 1, 1, 1, 0, 1], dtype=bool)) == (3, 3)
     assert longest_stretch(np.zeros(4, dtype=bool)) == (0, 0)
 

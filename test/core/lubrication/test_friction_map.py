@@ -347,7 +347,7 @@ def test_law_stays_within_its_table(pressure, speed):
         ({'pressures': (1e5, 0.0)}, 'does not increase'),
     ],
 )
-def test_table_without_sense_is_refused(change, words):
+def test_an_invalid_table_is_refused(change, words):
     with pytest.raises(ValueError, match=words):
         dataclasses.replace(LAW, **change)
 

@@ -110,7 +110,7 @@ def test_a_declared_weight_makes_friction_at_rest_known():
     assert (run.estimates()['axis'].status, run.estimates()['axis'].state) == (0, STUCK)
 
 
-def test_spring_and_load_over_position():
+def test_spring_and_load_over_position_are_terms_of_the_force_sum():
     table = {'positions': [0.0, 0.1, 0.3], 'forces': [100.0, 200.0, 0.0]}
     loads = [m.load_at(m.LoadTable((0.0, 0.1, 0.3), (100.0, 200.0, 0.0)), x) for x in (0.0, 0.05, 0.2, 0.3)]
     assert loads == pytest.approx([100.0, 150.0, 100.0, 0.0])

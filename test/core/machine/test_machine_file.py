@@ -37,12 +37,12 @@ MISTAKES = {
     'no pressure b': ({'inputs': {k: v for k, v in INPUTS.items() if k != 'pressure_b'}}, 'write pressure_b: 0.0'),
     'topic': ({'inputs': INPUTS | {'velocity': '/joint_state velocity[axis]'}}, 'is not among topics: /joint_states'),
     'no field': ({'inputs': INPUTS | {'velocity': '/joint_states'}}, 'name the field'),
-    'unit': ({'inputs': INPUTS | {'pressure_a': {'topic': '/p_a', 'unit': 'N'}}}, 'is none of a pressure: Pa, kPa'),
+    'unit': ({'inputs': INPUTS | {'pressure_a': {'topic': '/p_a', 'unit': 'N'}}}, 'is not for a pressure: Pa, kPa'),
     'gain': ({'inputs': INPUTS | {'pressure_a': {'topic': '/p_a', 'gain': 0.0}}}, 'gain = 0'),
     'rod': ({'rod': '41 mm'}, 'is not below bore'),
     'no rod': ({'rod': None}, 'lacks rod'),
     'no areas': ({'rod': None, 'bore': None}, 'needs the areas'),
-    'length': ({'bore': '40 bar'}, "unit 'bar' is none of a length"),
+    'length': ({'bore': '40 bar'}, "unit 'bar' is not for a length"),
     'nan': ({'bore': math.nan}, 'not a finite number'),
     'seals': ({'seals': ['ms28775_114@c']}, 'is not a, b, difference or ambient'),
     'velocity from position': ({'inputs': {k: v for k, v in INPUTS.items() if k != 'velocity'}}, 'step: 5 um'),
@@ -128,7 +128,7 @@ def with_parts(**parts):
     return parse_machine(yaml.safe_load(BENCH) | parts, 'robot.yaml')
 
 
-def test_what_is_not_given_is_standard():
+def test_a_key_that_is_not_given_has_its_default():
     file = parsed(BENCH)
     assert (file.ambient_pressure, file.together) == (101_325.0, False)
     assert with_parts(answers='together').together
@@ -205,13 +205,13 @@ def test_a_length_is_in_metres_or_has_its_unit(value, metres):
         (True, 'is not a number [m] or text such as 1.0 in'),
         (63, 'bore = 63 m is above 3 m; if it is in mm, write 63 mm'),
         ('40', "'40' is not a number [m]"),
-        ('40mm wide', "unit 'mm wide' is none of a length"),
+        ('40mm wide', "unit 'mm wide' is not for a length"),
         ([1.0], 'is not a number [m]'),
         (math.inf, 'is not a finite number below 1e15'),
         (1e15, 'is not a finite number below 1e15'),
         ('1e18 mm', 'is not a finite number below 1e15'),
         ('1.2.3 mm', "bore = '1.2.3 mm'"),
-        ('40 kg', "unit 'kg' is none of a length: m, mm, cm, um, in"),
+        ('40 kg', "unit 'kg' is not for a length: m, mm, cm, um, in"),
     ],
 )
 def test_what_is_no_length_is_refused(value, complaint):
@@ -284,8 +284,8 @@ def test_a_message_with_one_number_needs_no_field(name, kind, field):
         ({'topic': '/y', 'field': 'data[0]'}, "topic '/y' is not among topics"),
         ({'field': 'data[0]'}, "topic 'None' is not among topics"),
         ({'topic': '/x', 'fields': 'data[0]'}, 'did you mean field?'),
-        ({'topic': '/x', 'field': 'data[0]', 'gain': '2 bar'}, "unit 'bar' is none of a number"),
-        ({'topic': '/x', 'field': 'data[0]', 'offset': '2 mm'}, "unit 'mm' is none of a pressure"),
+        ({'topic': '/x', 'field': 'data[0]', 'gain': '2 bar'}, "unit 'bar' is not for a number"),
+        ({'topic': '/x', 'field': 'data[0]', 'offset': '2 mm'}, "unit 'mm' is not for a pressure"),
     ],
 )
 def test_what_is_no_signal_is_refused(value, complaint):
@@ -356,7 +356,7 @@ def test_an_encoder_that_cannot_be_is_refused(values, complaint):
         ({'force_sum': {'weight': {'mass': 1.0}}}, 'force_sum.weight lacks angle'),
         ({'force_sum': {'weight': {'mass': 0.0, 'angle': 0.0}}}, 'mass = 0.0 is not above 0'),
         ({'force_sum': {'spring': {'stiffness': 0.0, 'rest_position': 0.0}}}, 'stiffness = 0.0 is not above 0'),
-        ({'force_sum': {'spring': {'stiffness': 1.0, 'rest_position': '1 kg'}}}, "unit 'kg' is none of a length"),
+        ({'force_sum': {'spring': {'stiffness': 1.0, 'rest_position': '1 kg'}}}, "unit 'kg' is not for a length"),
         ({'force_sum': {'load_over_position': {'positions': [0.0], 'forces': [1.0]}}}, 'give two or more of both'),
         ({'force_sum': {'load_over_position': {'positions': [0.0, 1.0], 'forces': [1.0]}}}, '2 positions and 1 forces'),
         ({'force_sum': {'load_over_position': {'positions': [0.0, 2.0, 1.0], 'forces': [1.0] * 3}}}, 'do not increase'),
@@ -371,7 +371,7 @@ def test_an_encoder_that_cannot_be_is_refused(values, complaint):
         ({'output': {'topic': '/x', 'type': 'sensor_msgs/msg/JointState', 'joint': 5}}, 'name the joint'),
         ({'output': {'topic': '/x', 'type': 'geometry_msgs/msg/WrenchStamped'}}, 'name the frame of a WrenchStamped'),
         ({'output': {'topic': '/x', 'type': 'std_msgs/msg/Float64', 'frame': 'rod'}}, 'and of no other type'),
-        ({'output': {'topic': '/x', 'type': 'std_msgs/msg/Float64', 'gain': '1 N'}}, "unit 'N' is none of a number"),
+        ({'output': {'topic': '/x', 'type': 'std_msgs/msg/Float64', 'gain': '1 N'}}, "unit 'N' is not for a number"),
         ({'parameters': 5}, 'parameters is not a mapping'),
     ],
 )  # fmt: skip

@@ -43,7 +43,7 @@ def taken(machine, state, first, last):
     return state, answers
 
 
-def test_what_comes_back_answers_to_the_bit_what_the_machine_would_have():
+def test_a_restored_machine_gives_the_same_answers_to_the_bit():
     state, _ = taken(MACHINE, m.init(MACHINE), 1, 150)
     text = machine_text(snapshot_of(MACHINE, state))
     again, restored = machine_of(parse_machine_text(text), DEFINITIONS)

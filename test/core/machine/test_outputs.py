@@ -26,7 +26,7 @@ def test_all_actuators_of_a_topic_share_one_array():
 
 
 @pytest.mark.parametrize('joint', ['b', 'boom', 'boom_joint'])
-def test_the_effort_of_a_joint(joint):
+def test_an_output_is_the_effort_of_its_joint(joint):
     output = {'topic': '/command', 'type': 'sensor_msgs/msg/JointState', 'joint': joint, 'gain': -2.0}
     state = read(commands(parsed(EXCAVATOR, output=output), {'boom': 3.0}, STAMP)[0])
     assert (list(state.name), list(state.effort), list(state.position)) == ([joint], [-6.0], [])

@@ -312,7 +312,7 @@ def test_a_friction_state_that_is_none_is_refused(state):
 
 
 @pytest.mark.parametrize(('nanoseconds', 'length'), [(10**9, 1), (0, 1025), (0, 2**32 - 1)])
-def test_a_header_that_makes_no_sense_is_refused(nanoseconds, length):
+def test_an_invalid_header_is_refused(nanoseconds, length):
     data = struct.pack('<4siII', b'\x00\x01\x00\x00', 0, nanoseconds, length) + bytes(12)
     with pytest.raises(ValueError, match='is not valid'):
         coder.decode(layouts.FORCE_TYPE, data)

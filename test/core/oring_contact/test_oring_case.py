@@ -226,7 +226,7 @@ def test_case_file_may_have_a_shear_law_in_the_place_of_a_coefficient():
         ({'unknown': {'rubber.hardness': {'tolerance': 26.0}}}, 'rubber.hardness = 95.74: hardness = .* outside'),
     ],
 )
-def test_case_file_without_sense_is_refused_in_one_line(changes, words):
+def test_an_invalid_case_file_is_refused_in_one_line(changes, words):
     with pytest.raises(ValueError, match=words) as caught:
         parse_oring_case(document(**changes))
     assert '\n' not in str(caught.value)

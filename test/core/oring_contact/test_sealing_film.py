@@ -57,7 +57,7 @@ def test_inverse_theory_finds_the_flow_of_a_wedge_from_its_pressure():
 
 
 @pytest.mark.parametrize('before', [0.0, 1e6])
-def test_strength_of_the_edge_of_hertz_with_and_without_fluid_before_it(before: float):
+def test_the_edge_of_hertz_has_its_closed_form_with_and_without_fluid_before_it(before: float):
     found = edge_strengths(lips((1e6, 0.4e-3)), 0.0, TRANSITION)
     assert found == pytest.approx(np.full((1, 2), 1e6 * math.sqrt(2.0 / 0.4e-3)), rel=1e-2)
     under_fluid = edge_strengths(lips((3e6, 0.4e-3), before=before), before, TRANSITION)

@@ -73,7 +73,7 @@ def test_strokes_that_fill_the_period_and_just_reach_their_speed():
     assert Trapezoid(cycles=0).duration == math.inf
 
 
-def test_a_chirp_in_the_middle_of_its_sweep():
+def test_a_chirp_follows_the_closed_form_in_and_after_its_sweep():
     wave = Chirp(amplitude=0.5, start_frequency=1.0, end_frequency=3.0, duration=4.0, offset=0.2)
     assert wave.at(2.0).position == pytest.approx(0.2 + 0.5 * math.sin(2.0 * math.pi * 1.5 * 2.0), abs=1e-12)
     assert wave.at(2.0).velocity == pytest.approx(0.5 * 2.0 * math.pi * 2.0 * math.cos(2.0 * math.pi * 3.0))
@@ -142,6 +142,6 @@ def test_pull_test_is_that_of_appendix_a():
         (partial(Step, size=11.0), 'above its upper bound'),
     ],
 )
-def test_wave_that_makes_no_sense_is_refused(make, reason):
+def test_an_invalid_wave_is_refused(make, reason):
     with pytest.raises(ValueError, match=reason):
         make()

@@ -35,7 +35,7 @@ PARTS = {part: part() for part in (ServoValve, PneumaticValve, Load)} | {
         ({'rate': 9.0}, 'rate = 9.0 Hz is below its lower bound 10.0 Hz'),
     ],
 )
-def test_settings_that_make_no_sense_are_refused_with_what_there_is(changes, reason):
+def test_invalid_settings_are_refused_with_what_there_is(changes, reason):
     with pytest.raises(ValueError, match=f'^SimulatorSettings.{reason}'):
         SimulatorSettings(**changes)
 

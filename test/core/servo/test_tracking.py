@@ -17,7 +17,7 @@ def test_dwell_counts_rest_between_opposite_motions_only():
     assert reversals(velocity) == 2
 
 
-def test_no_reversal_no_dwell():
+def test_without_a_reversal_there_is_no_dwell():
     assert dwell_per_reversal(np.array([0.0, 1.0, 0.0, 1.0]), 0.1) == 0.0
     assert dwell_per_reversal(np.zeros(5), 0.1) == 0.0
     assert reversals(np.zeros(5)) == 0
@@ -36,7 +36,7 @@ def test_a_rod_exactly_at_the_standstill_speed_rests():
     assert reversals(velocity) == 3
 
 
-def test_rms_and_peak():
+def test_rms_and_peak_are_those_of_the_difference():
     reference, position = np.array([0.0, 0.0, 3.0, 0.0]), np.array([0.0, 4.0, 3.0, 0.0])
     assert tracking_rms(reference, position) == 2.0
     assert tracking_peak(reference, position) == 4.0

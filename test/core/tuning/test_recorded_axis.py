@@ -58,7 +58,7 @@ def recording(
     )
 
 
-def test_scale_mass_and_offset_come_back():
+def test_scale_mass_and_offset_of_a_simulated_axis_are_found():
     law = fit_law(recording(noise=2.0))
     assert law.scale == pytest.approx(0.8, abs=4.0 * law.scale_std)
     assert law.scale_std < 0.01
@@ -205,7 +205,7 @@ def test_the_largest_hundredth_of_the_frictions_is_noise(share, counts):
     assert largest_friction(made, law._replace(friction=0.0 * law.friction)) == pytest.approx(44.0, rel=0.01)
 
 
-def test_what_remains_counts_where_the_rod_slides_and_near_a_reversal():
+def test_the_residual_counts_where_the_rod_slides_and_near_a_reversal():
     law = RecordedLaw(
         1.0, 0.0, 0.0, False, 0.0, np.array([3.0, 5.0, 9.0, np.nan]), np.array([True, True, False, False]),
         Account('', 2, {'at rest': 2}),

@@ -108,7 +108,7 @@ def test_units_signs_and_areas(tmp_path):
     assert summary == (3, 0, 3_000_000_000, 3_041_500_000, {}, ())
 
 
-def test_position_and_wanted_motion_come_into_the_bag(tmp_path):
+def test_position_and_wanted_motion_are_in_the_bag(tmp_path):
     time = np.arange(40) * 0.01
     wanted = 0.02 * np.sin(3.0 * time)
     log = ''.join(f'{1000 * t:.6f},2,10,1,{1000 * x!r}\n' for t, x in zip(time.tolist(), wanted.tolist(), strict=True))
@@ -131,7 +131,7 @@ def test_position_and_wanted_motion_come_into_the_bag(tmp_path):
         ({'reference_velocity': {'terms': [{'column': 1, 'unit': 'mm'}]}}, 'is not a velocity'),
     ],
 )
-def test_a_wanted_motion_that_makes_no_sense_is_refused(tmp_path, rig, pattern):
+def test_an_invalid_wanted_motion_is_refused(tmp_path, rig, pattern):
     assert_refused(tmp_path, pattern, rig=changed(**rig))
 
 
@@ -406,7 +406,7 @@ POSITION_RIG = changed(
 )
 
 
-def test_velocity_from_position_in_a_log(tmp_path):
+def test_a_log_of_positions_gets_its_velocity(tmp_path):
     log = ''.join(f'{10 * i} 1 1 {0.12 * i}\n' for i in range(100))  # 0.12 mm in 10 ms
     _, bag = imported(tmp_path, log, POSITION_RIG)
     assert signals(bag)[4] == pytest.approx(0.012, abs=1e-12)
@@ -493,7 +493,7 @@ def test_garbage_in_the_log_gives_one_line(tmp_path, log, pattern):
         (changed(frame_id='a\nb'), 'Rig.frame_id'),
     ],
 )
-def test_a_rig_file_that_makes_no_sense_gives_one_line(tmp_path, rig, pattern):
+def test_an_invalid_rig_file_gives_one_line(tmp_path, rig, pattern):
     assert_refused(tmp_path, pattern, rig=rig)
 
 
@@ -506,12 +506,12 @@ def test_a_name_that_is_not_once_in_the_header(tmp_path, header, times):
     assert_refused(tmp_path, re.escape("chamber_a.terms[0].column_name = 'p A'") + f'.*{times}', header + ROWS, rig)
 
 
-def test_a_log_too_short_for_the_filter(tmp_path):
+def test_a_log_too_short_for_the_filter_is_refused(tmp_path):
     log = ''.join(f'{10 * i} 1 1 1\n' for i in range(20))  # the window holds 21
     assert_refused(tmp_path, r'log.csv: no stretch of rows .* window of 0.2 s', log, POSITION_RIG)
 
 
-def test_a_window_too_short_for_the_order(tmp_path):
+def test_a_window_too_short_for_the_order_is_refused(tmp_path):
     log = ''.join(f'{10 * i} 1 1 1\n' for i in range(100))
     filter_values = {'window': 0.02, 'order': 4, 'largest_gap': 0.1}
     rig = changed(velocity={**POSITION_RIG['velocity'], 'savitzky_golay': filter_values})

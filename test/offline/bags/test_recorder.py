@@ -126,7 +126,7 @@ def test_stopping_does_not_wait_for_the_disk(tmp_path: Path, monkeypatch):
     assert texts(tmp_path / 'bag') == ['0']
 
 
-def test_what_waits_for_the_disk_is_no_burden_on_the_garbage_collector(tmp_path: Path, monkeypatch):
+def test_messages_that_wait_for_the_disk_are_not_tracked_by_the_garbage_collector(tmp_path: Path, monkeypatch):
     recorder = Recorder(tmp_path / 'bag')
     monkeypatch.setattr(mcap_writer, 'os', Disk(delay=1.0))
     gc.collect()

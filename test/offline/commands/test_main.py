@@ -143,10 +143,10 @@ def test_a_yaml_file_as_deep_as_one_likes_is_exit_code_2_and_one_line(name: str,
         ('gland_diameter: 20.8534e-3', 'gland_diameter: 0.015', ['gland_diameter', '0.015', 'rod_diameter']),
         ('law: power_law', 'law: magic', ['friction_coefficient', 'magic', 'power_law']),
         ('stiction: 0.724347', 'stiction: lots', ['stiction', 'lots']),
-        ('stiction: 0.724347', 'stiction: 2 mm', ['stiction', 'mm', 'none of a']),
+        ('stiction: 0.724347', 'stiction: 2 mm', ['stiction', 'mm', 'not for a']),
     ],
 )
-def test_a_seal_that_makes_no_sense_is_exit_code_2_with_field_value_and_bound(
+def test_an_invalid_seal_is_exit_code_2_with_field_value_and_bound(
     old: str, new: str, words: list[str], tmp_path: Path, capsys
 ):
     seal = tmp_path / 'seal.yaml'

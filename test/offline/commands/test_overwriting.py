@@ -84,7 +84,9 @@ def test_every_option_that_writes_is_known_as_a_target():
 
 
 @pytest.mark.parametrize(('command', 'option', 'kind'), targets(), ids=str)
-def test_what_a_command_did_not_make_is_refused(command, option, kind: Kind, tmp_path: Path, capsys):
+def test_a_command_refuses_to_overwrite_a_file_that_it_did_not_make(
+    command, option, kind: Kind, tmp_path: Path, capsys
+):
     target = tmp_path / f'mine{kind.suffixes[0] if kind.suffixes else ""}'
     if kind is BAG:
         write_inputs(target, 3)

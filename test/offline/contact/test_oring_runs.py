@@ -265,7 +265,7 @@ def test_the_law_of_a_seal_makes_the_seal_of_another_size(tmp_path: Path):
     ('more', 'message'),
     [
         (['--reading', '1e6,0.01'], '1e6,0.01 is not 3 values, separated by commas'),
-        (['--reading', '1e6,10 kg,5'], "unit 'kg' is none of a velocity"),
+        (['--reading', '1e6,10 kg,5'], "unit 'kg' is not for a velocity"),
         (['--reading=-1,0.01,5'], '-1 is not a finite number of at least 0'),
         (['--reading', '5e6,0.01,5'], 'are outside the computed 0 to 1.7e+06 Pa: give --pressures'),
         (['--reading', '1e6,0.01,5', '--uncertain', '2'], '--uncertain is for a ring without a --reading'),

@@ -37,7 +37,7 @@ def test_columns_may_stand_in_any_order(tmp_path: Path):
     [
         ('r,z', SQUARE, 'name columns and units there, for example "r \\[mm\\], z \\[mm\\]"'),
         ('10.0,0.0', SQUARE, 'name columns and units there'),
-        ('r [mm],z [bar]', SQUARE, "unit 'bar' is none of a length: m, mm"),
+        ('r [mm],z [bar]', SQUARE, "unit 'bar' is not for a length: m, mm"),
         ('r [mm],z [mm]', (*SQUARE, (1.0, 2.0, 3.0)), 'is not 2 numbers, separated by commas'),
         ('r [mm],z [mm]', (SQUARE[0], SQUARE[2], SQUARE[1], SQUARE[3]), 'crosses or touches itself'),
     ],

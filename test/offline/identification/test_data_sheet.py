@@ -171,6 +171,6 @@ def test_an_empty_sheet_is_told_to_be_filled(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(('low', 'high', 'steps'), [(0.0, 0.0, 5), (-1.0, 5.0, 5), (0.0, 5.0, 1), (0.0, 5.0, 1000)])
-def test_a_plan_that_makes_no_sense_is_refused(low, high, steps):
+def test_an_invalid_plan_is_refused(low, high, steps):
     with pytest.raises(ValueError, match='pressure'):
         FrictionTestPlan('ring', low, high, steps, tests=3, seals=2, geometry=None, **UNITS)

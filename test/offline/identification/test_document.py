@@ -111,7 +111,7 @@ def test_a_log_and_the_bag_imported_from_it_give_the_same_law(tmp_path, run_of):
 # --- the file itself ---
 
 
-def test_json_has_the_promised_keys_and_the_file_says_where_it_is_from(run_of):
+def test_json_has_the_documented_keys_and_the_file_names_its_source(run_of):
     run = run_of(str(THESIS), *THESIS_RIG)
     assert set(KEYS) <= set(run.figures)
     part = run.document['identification']

@@ -83,7 +83,7 @@ def test_a_row_has_the_newest_numbers_in_the_units_of_the_page():
     assert shown['limited'] == Limited.SLEW
 
 
-def test_what_never_came_is_a_gap_and_no_zero():
+def test_an_input_that_never_came_is_a_gap_and_no_zero():
     shown = as_mapping(row(KNOWN, NOTHING_HELD, 0.0))
     assert {name for name, value in shown.items() if value is not None} == {'time', 'status', 'limited'}
 

@@ -32,7 +32,7 @@ def test_compare_says_first_largest_and_rms_difference(tmp_path: Path, capsys):
     assert found['fields']['stamp']['largest'] == 0.0
 
 
-def test_what_was_learnt_does_not_decide_unless_it_is_named(tmp_path: Path, capsys):
+def test_learnt_fields_do_not_decide_a_comparison_unless_named(tmp_path: Path, capsys):
     """Another deviation and another age of the inputs are no other friction; states are counted."""
     counter = iter(range(10_000))
 

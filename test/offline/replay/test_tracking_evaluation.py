@@ -273,7 +273,7 @@ def test_the_period_of_a_sine_is_found(frequency):
     ],
     ids=['chirp', 'constant', 'ramp', 'noise', 'one and a half periods'],
 )
-def test_what_does_not_repeat_itself_has_no_period(values):
+def test_a_signal_that_does_not_repeat_has_no_period(values):
     assert periodicity(np.arange(4000) / RATE, np.asarray(values)) is None
 
 

@@ -118,7 +118,7 @@ def test_another_seal_is_drawn_alone_without_the_data_of_the_thesis(tmp_path):
     assert page.texts['p.note'][0].startswith('500 psi is outside the identified range')
 
 
-def test_a_seal_file_that_makes_no_sense_is_one_line_that_names_it_and_nothing_is_written(tmp_path):
+def test_an_invalid_seal_file_is_one_line_that_names_it_and_nothing_is_written(tmp_path):
     path = seal_file(tmp_path, stiction=-1.0)
     with pytest.raises(ValueError, match=r'seal\.yaml.*stiction = -1\.0') as error:
         write_seal_charts(path, tmp_path / 'out' / 'charts.html')

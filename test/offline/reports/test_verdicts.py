@@ -24,7 +24,7 @@ def test_an_identified_law_is_judged_on_readings_that_it_has_not_seen(changed, l
     assert verdicts.of_identification(**{**LAW, **changed}).level == level
 
 
-def test_what_is_unusual_about_the_readings_is_to_be_looked_at():
+def test_an_outlier_is_a_reason_to_look():
     verdict = verdicts.of_identification(*LAW.values(), 'one pressure is an outlier')
     assert verdict.level == LOOK
     assert verdict.text.endswith('; one pressure is an outlier.')

@@ -96,7 +96,7 @@ def test_study_and_map_without_extent_are_refused():
         ({'seals': [{'case': 'y', 'shift': 2.0}]}, r'spool x: seals\[0\]: SpoolSeal.shift = 2.0 m is above'),
     ],
 )
-def test_ring_or_spool_without_sense_is_refused_in_one_line(document, words):
+def test_an_invalid_ring_or_spool_is_refused_in_one_line(document, words):
     with pytest.raises(ValueError, match=words) as caught:
         parse_study_case({'name': 'x'} | document, load)
     assert '\n' not in str(caught.value)

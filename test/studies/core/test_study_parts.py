@@ -204,7 +204,7 @@ def test_lubricant_of_a_cell_lies_in_the_part_that_the_seal_leaves_free():
     assert FILM.ahead(-9e-6, 9e-6, *seal) == pytest.approx([1e-12, 0.0, 3e-12, 4e-12])  # never more than all
 
 
-def test_what_a_stroke_leaves_is_laid_evenly_and_what_does_not_fit_is_pushed_ahead():
+def test_the_film_of_a_stroke_is_laid_evenly_and_excess_film_is_pushed_ahead():
     none = np.zeros(4)
     laid = FILM.moved(none, 0.0, 0.0, -1.5e-6, 0.0, 6e-12).volume - FILM.volume
     assert laid == pytest.approx([2e-12, 4e-12, 0.0, 0.0], abs=1e-25)
@@ -215,7 +215,7 @@ def test_what_a_stroke_leaves_is_laid_evenly_and_what_does_not_fit_is_pushed_ahe
 
 
 @pytest.mark.parametrize(('place', 'cell'), [(-9e-6, 0), (-1.5e-6, 0), (-0.5e-6, 1), (0.5e-6, 2), (9e-6, 3)])
-def test_what_leaves_a_seal_at_rest_stays_where_it_stands_or_at_the_end_of_the_wall(place, cell):
+def test_film_that_leaves_a_seal_at_rest_stays_beside_it_or_at_the_end_of_the_wall(place, cell):
     left = FILM.moved(np.zeros(4), 0.0, place, place, place, 2e-12).volume - FILM.volume
     assert left == pytest.approx(2e-12 * np.eye(4)[cell], abs=1e-25)
 
@@ -268,7 +268,7 @@ def test_measured_motion_passes_through_its_samples():
         ([0.0, 1.0], [0.0, math.nan], 'finite'),
     ],
 )
-def test_measured_motion_without_sense_is_refused(times, positions, words):
+def test_an_invalid_measured_motion_is_refused(times, positions, words):
     with pytest.raises(ValueError, match=words):
         MeasuredMotion(times, positions)
 

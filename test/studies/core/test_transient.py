@@ -446,7 +446,7 @@ def test_case_document_makes_a_case_with_the_defaults_of_the_paper():
         ({'name': 'x', 'seals': [{'case': 'y', 'side': 1}]}, r'seals\[0\] has no side'),
     ],
 )
-def test_case_without_sense_is_refused_in_one_line(document, words):
+def test_an_invalid_case_is_refused_in_one_line(document, words):
     with pytest.raises(ValueError, match=words) as caught:
         parse_study_case(document)
     assert '\n' not in str(caught.value)

@@ -38,7 +38,7 @@ def run(tmp_path, capsys, log: Path, *more: str):
     return code, json.loads(said.out)['numbers'] if code == 0 else said.err
 
 
-def test_reference_force_and_resonance_come_out(tmp_path, capsys):
+def test_reference_force_and_resonance_are_those_of_the_simulated_log(tmp_path, capsys):
     code, numbers = run(tmp_path, capsys, table(tmp_path / 'log.csv'))
     assert code == 0, numbers
     assert numbers['reference_force_N'] == pytest.approx(FRICTION, rel=0.05)
