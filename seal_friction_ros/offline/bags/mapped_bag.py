@@ -12,6 +12,7 @@ from seal_friction_ros.core.machine.machine import (
     MachineState,
     init,
     make_machine,
+    named_emits,
     receive,
     records_of,
     stamp_of,
@@ -104,6 +105,7 @@ def machine_messages(bag: Path, mapping: MappingFile | None, *, with_answers: bo
         kind = coder.type_of(record)
         answers.append((f'/{name}/{LAST_PART[kind]}', kind, coder.encode(record, frame_id)))
 
+    emits = named_emits(machine, collect)
     text = coder.encode_text(machine_text(snapshot_of(machine, state)))
     for number, message in enumerate(read_messages(bag)):
         if number == 0:
@@ -113,7 +115,7 @@ def machine_messages(bag: Path, mapping: MappingFile | None, *, with_answers: bo
             if with_answers:
                 plan = machine.plans[message.topic]
                 with named(bag, message):
-                    state = receive(machine, state, plan, plan.read(message.data), message.log_time, collect)
+                    receive(machine, state, plan, plan.read(message.data), message.log_time, emits)
                 yield from (BagMessage(topic, kind, message.log_time, data) for topic, kind, data in answers)
                 answers.clear()
         elif message.type_name not in (*coder.DECODERS, layouts.MACHINE_TYPE):
@@ -130,7 +132,7 @@ class Translation:
     def __init__(
         self, machine: Machine, state: MachineState, only: str = '', malformed: Counter[str] | None = None
     ) -> None:
-        self._actuators, self._states = machine.actuators, list(state.actuators)
+        self._actuators, self._states = machine.actuators, [replace(one) for one in state.actuators]
         self.malformed: Counter[str] = Counter() if malformed is None else malformed
         self._plans = {
             topic: plan._replace(taken=tuple(one for one in plan.taken if only in ('', machine.actuators[one[0]].name)))
@@ -166,13 +168,14 @@ class Translation:
                 memory, made = records_of(actuator, known.memory, taken, reading.numbers, stamp, reading.frame_id)
             except (ArithmeticError, ValueError):
                 continue  # as the node: the actuator does not take the message
-            self._states[number] = known._replace(memory=memory)
+            known.memory = memory
             yield from ((number, record, reading.frame_id) for record in made)
 
     def follow(self, clock: Clock, received: int) -> None:
         """Follow simulated time."""
         offset = clock.stamp - received
-        self._states = [one._replace(pipeline=replace(one.pipeline, clock_offset=offset)) for one in self._states]
+        for one in self._states:
+            one.pipeline = replace(one.pipeline, clock_offset=offset)
 
 
 def is_for(mapping: MappingFile, infos: Mapping[str, TopicInfo]) -> bool:
