@@ -88,6 +88,11 @@ class _Input(NamedTuple):
     type_name: str
     statistics: list[EstimatorDiagnostics]  # of the actuators that take it
 
+    def count(self, stamp: int | None, lateness: int) -> None:
+        """Count one message, as `EstimatorDiagnostics.on_input`."""
+        for each in self.statistics:
+            each.on_input(self.plan.topic, stamp, lateness)
+
 
 class _Output(NamedTuple):
     """An answer of an actuator of an active node."""
@@ -115,7 +120,7 @@ class EstimatorNode(ManagedNode):
     def __init__(self, name: str, groups: tuple[ParameterGroup, ...], **kwargs: Any) -> None:
         self._mapping: MachineFile | None = None
         self._sent: list[tuple[_Output, Output, bytes]] = []  # where to, answer, its bytes or frame name
-        self._uncounted: list[tuple[Any, ...]] = []  # what counts a message, and its arguments
+        self._uncounted: list[tuple[_Input | _Output, Any, int]] = []  # of each message since the last `_count`
         self._together = b''
         self._newest: dict[str, bytes] = {}
         self._complete: set[str] = set()  # topics that had all numbers of all actuators in a message
@@ -314,12 +319,10 @@ class EstimatorNode(ManagedNode):
             message = plan.read(data)
         except ValueError as error:
             self._on_malformed(taken, error)
-            self._look_after_timers(received)
             return
         sent = received - lateness if received > lateness else 0
         receive(self._machine, self._state, plan, message, received, self._emits, sent)
         commands = self._send_rest(received) if self._has_rest else []
-        done = self.now()
 
         # Nobody waits for what follows.
         recorder = self.recording.recorder
@@ -330,19 +333,20 @@ class EstimatorNode(ManagedNode):
         stamp = message.stamp
         if not plan.holds_records:
             stamp, self._newest[name] = None, data
-        for statistics in taken.statistics:
-            self._uncounted.append((statistics.on_input, name, stamp, lateness))
+        self._uncounted.append((taken, stamp, lateness))
         if self._sent:
-            self._record_answers(commands, done, done - received)
+            self._record_answers(commands, received)
             self._follow(plan)
             if recorder is not None:
                 recorder.flush_if_idle()
-        self._look_after_timers(done)
+        if received - self._watchdog_called > _STARVED:
+            self.call_overdue_timers()
 
     def _on_malformed(self, taken: _Input, error: ValueError) -> None:
         for statistics in taken.statistics:
             statistics.on_malformed(taken.plan.topic)
         self.get_logger().error(f'{taken.topic}: {error}', throttle_duration_sec=1.0)
+        self.call_overdue_timers()
 
     def _send(self, outputs: Mapping[type, _Output], answer: Output, frame_id: bytes) -> None:
         """Publish an answer at once, if it is a message of its own; the rest waits until all answers are out."""
@@ -365,18 +369,18 @@ class EstimatorNode(ManagedNode):
             self._publish['', command.topic](command.data)
         return commands
 
-    def _record_answers(self, commands: list[Command], done: int, latency: int = 0) -> None:
-        """Record and count what was sent until ``done``, ``latency`` [ns] after its input was taken."""
-        record = self.recording.record
+    def _record_answers(self, commands: list[Command], received: int) -> None:
+        """Record and count what was sent in answer to what was ``received`` [ns]."""
+        recorder, done = self.recording.recorder, self.now()
         for output, answer, data in self._sent:
-            if output.publish is not None:
-                record(output.topic, output.type_name, done, data)
-            self._uncounted.append((output.count, answer, latency))
+            if recorder is not None and output.publish is not None:
+                recorder.record(output.topic, output.type_name, done, data)
+            self._uncounted.append((output, answer, done - received))
         self._sent.clear()
         if self._together:
-            record(self._topics['', MACHINE_TYPE], MACHINE_TYPE, done, self._together)
+            self.recording.record(self._topics['', MACHINE_TYPE], MACHINE_TYPE, done, self._together)
         for command in commands:
-            record(command.topic, full_name(command.type_name), done, command.data)
+            self.recording.record(command.topic, full_name(command.type_name), done, command.data)
 
     def _follow(self, plan: TopicPlan) -> None:
         """Follow pressures and adaptation of the actuators that have taken a message."""
@@ -394,8 +398,8 @@ class EstimatorNode(ManagedNode):
     def _count(self) -> None:
         """Count the messages since the last call, all in one go: between two samples it would delay the next one."""
         uncounted, self._uncounted = self._uncounted, []
-        for count, *values in uncounted:
-            count(*values)
+        for taken_or_sent, message, duration in uncounted:
+            taken_or_sent.count(message, duration)
 
     def on_watchdog(self) -> bool:
         """Renew each feed-forward that no velocity sample renews, so that it fades out."""
@@ -412,7 +416,7 @@ class EstimatorNode(ManagedNode):
         receive(self._machine, self._state, plan, tick, received, self._emits)
         commands = self._send_rest(received) if self._has_rest else []
         self.recording.record(plan.topic, TICK_TYPE, received, encode(tick))
-        self._record_answers(commands, self.now())
+        self._record_answers(commands, received)
 
     def fade_out(self) -> None:
         """Fade every force to 0 N within ``fade_time``, whatever comes."""
@@ -531,11 +535,6 @@ class EstimatorNode(ManagedNode):
         if now - self._watched >= _WATCH_PERIOD:
             self._watched = now
             self._look_at_graph()
-
-    def _look_after_timers(self, now: int) -> None:
-        """Call what is overdue at ``now`` [ns], if the watchdog was not called for long."""
-        if now - self._watchdog_called > _STARVED:
-            self.call_overdue_timers()
 
     def publish_newest(self) -> None:
         """Publish the newest messages for the live view, if there is one: 100 a second and not thousands."""

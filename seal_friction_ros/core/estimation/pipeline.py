@@ -202,7 +202,7 @@ def receive(
         sent: When its publisher sent it [ns], on the clock of ``received``; None: just then.
     """
     since = acting_since(parameters.feedforward, received, received if sent is None else sent)
-    _RECEIVERS[type(message)](parameters, state, message, received, since, emit)
+    RECEIVERS[type(message)](parameters, state, message, received, since, emit)
 
 
 def no_answer(_record: Output, _frame_id: bytes) -> None:
@@ -344,7 +344,7 @@ def receive_position(
     """Nothing depends on the position; it is recorded to show how the servo tracks."""
 
 
-_RECEIVERS: dict[type, Callable[[Any, PipelineState, Any, int, int, Any], None]] = {
+RECEIVERS: dict[type, Callable[[Any, PipelineState, Any, int, int, Any], None]] = {
     Velocity: receive_velocity,
     Pressure: receive_pressure,
     Force: receive_force,
@@ -354,6 +354,7 @@ _RECEIVERS: dict[type, Callable[[Any, PipelineState, Any, int, int, Any], None]]
     Clock: receive_clock,
     WatchdogTick: receive_tick,
 }
+"""What takes each kind of message, see `receive`; the fifth argument is what `acting_since` gives."""
 
 
 def is_tick_due(state: PipelineState, now: int) -> bool:

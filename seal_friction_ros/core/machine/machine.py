@@ -25,7 +25,13 @@ from typing import Any, NamedTuple
 from seal_friction_ros.core.estimation import pipeline
 from seal_friction_ros.core.estimation.configuration import Configuration
 from seal_friction_ros.core.estimation.feedforward import newest_force
-from seal_friction_ros.core.estimation.pipeline import ZERO_CELSIUS, PipelineParameters, PipelineState
+from seal_friction_ros.core.estimation.pipeline import (
+    RECEIVERS,
+    ZERO_CELSIUS,
+    PipelineParameters,
+    PipelineState,
+    acting_since,
+)
 from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.machine.differentiator import NO_WINDOW, Differentiator, Window, differentiate
 from seal_friction_ros.core.machine.machine_file import Actuator, ForceSum, LoadTable, MachineFile, Signal
@@ -278,26 +284,28 @@ def receive(
     """
     for number, taken in plan.taken:
         actuator, known = machine.actuators[number], state.actuators[number]
+        parameters, running = actuator.pipeline, known.pipeline
+        since = acting_since(parameters.feedforward, received, received if sent is None else sent)
         if type(message) in KEPT:  # two of three messages: nothing in them can fail half-way
-            pipeline.receive(actuator.pipeline, known.pipeline, message, received, pipeline.no_answer, sent)
+            RECEIVERS[type(message)](parameters, running, message, received, since, pipeline.no_answer)
             continue
-        memory, made, kept = known.memory, known.pipeline.feedforward, known.pipeline.kept()  # all or nothing
+        memory, made, kept = known.memory, running.feedforward, running.kept()  # all or nothing
         records: Sequence[Input] = (message,)
         try:
             if taken:
                 stamp = message.stamp
                 if stamp is None:
-                    stamp = stamp_of(actuator, known.pipeline, received, sent)
+                    stamp = stamp_of(running, received, since)
                 memory, records = records_of(actuator, memory, taken, message.numbers, stamp, message.frame_id)
             for record in records:
-                pipeline.receive(actuator.pipeline, known.pipeline, record, received, emits[number], sent)
+                RECEIVERS[type(record)](parameters, running, record, received, since, emits[number])
         except (ArithmeticError, ValueError) as error:
-            known.pipeline.restore(kept)
+            running.restore(kept)
             known.force, known.fault = 0.0, f'{plan.topic}: {type(error).__name__}: {error}'
             continue
         known.memory, known.fault = memory, ''
-        if known.pipeline.feedforward is not made:
-            known.force = newest_force(known.pipeline.feedforward)
+        if running.feedforward is not made:
+            known.force = newest_force(running.feedforward)
 
 
 def named_emits(machine: Machine, emit: Emit) -> list[pipeline.Emit]:
@@ -305,9 +313,8 @@ def named_emits(machine: Machine, emit: Emit) -> list[pipeline.Emit]:
     return [partial(emit, actuator.name) for actuator in machine.actuators]
 
 
-def stamp_of(actuator: MachineActuator, known: PipelineState, received: int, sent: int | None) -> int:
-    """Stamp [ns] of a message that has none: when it was sent, if it came in time."""
-    since = NEVER if sent is None else pipeline.acting_since(actuator.pipeline.feedforward, received, sent)
+def stamp_of(known: PipelineState, received: int, since: int) -> int:
+    """Stamp [ns] of a message that has none: when it was sent, if it came in time; ``since`` as of `acting_since`."""
     return (received if since == NEVER else since) + known.clock_offset
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from seal_friction_ros.core.estimation.configuration import Configuration
+from seal_friction_ros.core.estimation.pipeline import acting_since
 from seal_friction_ros.core.machine.machine import (
     Machine,
     MachineState,
@@ -163,7 +164,8 @@ class Translation:
             actuator, known = self._actuators[number], self._states[number]
             stamp = reading.stamp
             if stamp is None:
-                stamp = stamp_of(actuator, known.pipeline, received, message.publish_time)
+                since = acting_since(actuator.pipeline.feedforward, received, message.publish_time or received)
+                stamp = stamp_of(known.pipeline, received, since)
             try:
                 memory, made = records_of(actuator, known.memory, taken, reading.numbers, stamp, reading.frame_id)
             except (ArithmeticError, ValueError):

@@ -202,7 +202,7 @@ def test_what_a_message_lacks_is_said():
 
 def test_an_actuator_whose_arithmetic_fails_leaves_the_others_alone_and_commands_nothing(monkeypatch):
     run, whole = excavator(), excavator()
-    receive = m.pipeline.receive
+    receive = m.RECEIVERS[Velocity]
 
     def fails(parameters, *others):
         if parameters is run.machine.actuators[0].pipeline:
@@ -211,7 +211,7 @@ def test_an_actuator_whose_arithmetic_fails_leaves_the_others_alone_and_commands
 
     data = message('sensor_msgs/JointState', 700 * MS, name=['boom', 'arm', 'bucket'], velocity=[0.1, 0.0, -0.1])
     whole.take('/joint_states', data, 700 * MS)
-    monkeypatch.setattr(m.pipeline, 'receive', fails)
+    monkeypatch.setitem(m.RECEIVERS, Velocity, fails)
     run.take('/joint_states', data, 700 * MS)
     assert run.answers == [answer for answer in whole.answers if answer[0] != 'boom']
     assert run.state.actuators[0].force == 0.0
@@ -220,15 +220,14 @@ def test_an_actuator_whose_arithmetic_fails_leaves_the_others_alone_and_commands
 
 def test_a_message_that_fails_half_way_changes_nothing(monkeypatch):
     run = bench_run(velocity=0.1)
-    kept, (known,), receive = run.state.actuators[0].pipeline.kept(), run.state.actuators, m.pipeline.receive
+    kept, (known,), receive = run.state.actuators[0].pipeline.kept(), run.state.actuators, m.RECEIVERS[Velocity]
     memory = known.memory
 
     def fails(*arguments):
         receive(*arguments)
-        if isinstance(arguments[2], Velocity):
-            raise OverflowError('too large')
+        raise OverflowError('too large')
 
-    monkeypatch.setattr(m.pipeline, 'receive', fails)
+    monkeypatch.setitem(m.RECEIVERS, Velocity, fails)
     joints = {'name': ['axis'], 'velocity': [0.2], 'position': [0.031]}
     run.take('/joint_states', message('sensor_msgs/JointState', 301 * MS, **joints), 301 * MS)
     assert len(run.answers) > 0
