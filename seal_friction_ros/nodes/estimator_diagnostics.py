@@ -145,14 +145,13 @@ class EstimatorDiagnostics:
         """Count one estimate, made ``latency`` [ns] after its velocity was taken."""
         self._by_status[estimate.status] += 1
         self._latencies.append(latency)
+        self._starts = seal_health.with_sample(self._starts, estimate)
         self._estimate = self._newest[FrictionEstimate] = estimate
         self._status |= estimate.status
 
-    def on_adaptation(self, turn: Turn | None) -> None:
-        """Follow what is learnt from the newest sample, whose estimate `on_estimate` has counted."""
-        self._starts = seal_health.with_sample(self._starts, self._estimate)
-        if turn is not None:
-            self._health = seal_health.followed(self._health, *turn)
+    def on_turn(self, turn: Turn) -> None:
+        """Follow what was learnt from a stroke."""
+        self._health = seal_health.followed(self._health, *turn)
 
     def on_reset(self) -> None:
         """Forget the reversals: the adaptation has."""
@@ -165,7 +164,7 @@ class EstimatorDiagnostics:
         level = DiagnosticStatus.WARN if said else DiagnosticStatus.OK
         return status_of(level, '; '.join(said) or 'no finding', values)
 
-    def on_feedforward(self, feedforward: FeedForward) -> None:
+    def on_feedforward(self, feedforward: FeedForward, _latency: int = 0) -> None:
         """Count one feed-forward."""
         self._feedforwards_by_limit[feedforward.limited] += 1
         force, before = feedforward.force, self._feedforward_force

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from functools import partial
 from operator import itemgetter
-from typing import Any
+from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
@@ -38,10 +38,10 @@ from seal_friction_ros.core.machine.machine_file import Actuator, MachineFile, o
 from seal_friction_ros.core.machine.machine_snapshot import machine_text, snapshot_of
 from seal_friction_ros.core.machine.outputs import Command, due_commands
 from seal_friction_ros.core.messages import layouts
-from seal_friction_ros.core.messages.coder import encode, encode_text, type_of
+from seal_friction_ros.core.messages.coder import ENCODERS, TYPES, encode, encode_text, type_of
 from seal_friction_ros.core.messages.definitions import full_name
 from seal_friction_ros.core.messages.layouts import CLOCK_TOPIC, CONFIGURATION_TYPE, MACHINE_TYPE, OUTPUTS, TICK_TYPE
-from seal_friction_ros.core.messages.records import FeedForward, Output, WatchdogTick
+from seal_friction_ros.core.messages.records import FeedForward, FrictionEstimate, Output, WatchdogTick
 from seal_friction_ros.core.messages.together import NamedAnswer, TopicMessage, encode_newest, encode_together
 from seal_friction_ros.files import load_configuration, read_machine
 from seal_friction_ros.nodes import qos
@@ -51,7 +51,7 @@ from seal_friction_ros.nodes.graph_watch import GraphFindings, GraphWatch
 from seal_friction_ros.nodes.input_watch import InputWatch
 from seal_friction_ros.nodes.managed_node import OVERDUE, ManagedNode, message_class, status_of
 from seal_friction_ros.nodes.recording import Recording
-from seal_friction_ros.nodes.subscription import taken, with_source_time
+from seal_friction_ros.nodes.subscription import taken, with_info
 from seal_friction_ros.offline.bags.bag import STATE_NAME, STATE_TYPE
 from seal_friction_ros.offline.bags.definitions import installed_definitions
 
@@ -80,6 +80,31 @@ def _lateness(source: int) -> int:
     return time.time_ns() - source if source else 0
 
 
+class _Input(NamedTuple):
+    """An input of an active node."""
+
+    plan: TopicPlan
+    topic: str
+    type_name: str
+    statistics: list[EstimatorDiagnostics]  # of the actuators that take it
+
+    def count(self, stamp: int | None, lateness: int) -> None:
+        """Count one message, as `EstimatorDiagnostics.on_input`."""
+        for each in self.statistics:
+            each.on_input(self.plan.topic, stamp, lateness)
+
+
+class _Output(NamedTuple):
+    """An answer of an actuator of an active node."""
+
+    actuator: str
+    topic: str
+    type_name: str
+    encode: Callable[[Output, bytes], bytes]
+    publish: Callable[[bytes], None] | None  # None: the answers of all actuators are one message
+    count: Callable[[Any, int], None]
+
+
 class EstimatorNode(ManagedNode):
     """Lifecycle node around `core.machine.machine`.
 
@@ -94,7 +119,8 @@ class EstimatorNode(ManagedNode):
 
     def __init__(self, name: str, groups: tuple[ParameterGroup, ...], **kwargs: Any) -> None:
         self._mapping: MachineFile | None = None
-        self._sent: list[tuple[str, Output, bytes]] = []  # name of the actuator, answer, its bytes or frame name
+        self._sent: list[tuple[_Output, Output, bytes]] = []  # where to, answer, its bytes or frame name
+        self._uncounted: list[tuple[_Input | _Output, Any, int]] = []  # of each message since the last `_count`
         self._together = b''
         self._newest: dict[str, bytes] = {}
         self._complete: set[str] = set()  # topics that had all numbers of all actuators in a message
@@ -106,9 +132,10 @@ class EstimatorNode(ManagedNode):
         self._topics: dict[Any, str] = {}
         self._newest_inputs: dict[str, TopicMessage] = {}
         self.has_viewer = False  # by a live view
-        self._watchdog_called = self._ticked = self._watched = 0  # [ns] of `time.perf_counter_ns`
+        self._ticked = self._watched = 0  # [ns] of `time.perf_counter_ns`
+        self._watchdog_called = 0  # [ns] as of `now`
         self._is_ticking = False
-        self._sorts_until = 0  # [ns] of `time.perf_counter_ns`
+        self._sorts_until = 0  # [ns] of `time.perf_counter_ns`; 0: messages are taken as they come
         self._is_change_due, self._applied = False, 0  # [ns] of `time.perf_counter_ns`
         self._sets = self._applications = 0  # of parameters since the last report
         super().__init__(name, groups, **kwargs)
@@ -206,9 +233,28 @@ class EstimatorNode(ManagedNode):
             actuator.name: EstimatorDiagnostics([t for t in self._types if number in dict(self._plans[t].taken)])
             for number, actuator in enumerate(self._file.actuators)
         }
+        self._uncounted.clear()
+        self._lowest = [Lowest() for _ in self._statistics]
+
+    def _bind(self) -> None:
+        """Look up once what each message needs."""
         every = list(self._statistics.values())
-        self._listeners = {topic: [every[number] for number, _ in self._plans[topic].taken] for topic in self._types}
-        self._lowest = [Lowest() for _ in every]
+        self._bound = {}
+        for name, kind in self._types.items():
+            plan = self._plans[name]
+            taking = [every[number] for number, _ in plan.taken]
+            self._bound[name] = _Input(plan, self._topics[name], kind, taking)
+        self._emits = [partial(self._send, self._outputs_of(*item)) for item in self._statistics.items()]
+        self._learnt = [known.pipeline.estimator.adaptation for known in self._state.actuators]
+
+    def _outputs_of(self, name: str, statistics: EstimatorDiagnostics) -> dict[type, _Output]:
+        counts = {FrictionEstimate: statistics.on_estimate, FeedForward: statistics.on_feedforward}
+        found = {}
+        for record, count in counts.items():
+            key = name, TYPES[record]
+            topic, publish = self._topics.get(key, ''), self._publish.get(key)
+            found[record] = _Output(name, topic, key[1], ENCODERS[record], publish, count)
+        return found
 
     def start(self) -> None:
         """Start to estimate from the initial state, and to record if ``record`` is set."""
@@ -217,10 +263,11 @@ class EstimatorNode(ManagedNode):
         if CLOCK_TOPIC in self._types:
             self._set(clock=0)  # stands still until it comes
         self._new_statistics()
+        self._bind()
         self._newest.clear()
         self._logged_errors.clear()
-        self._watchdog_called = time.perf_counter_ns()
         self._receipt_offset = time.time_ns() - time.monotonic_ns()
+        self._watchdog_called = self.now()
         needed = [name for name in self._types if name not in _OPTIONAL_INPUTS]
         self._input_watch = InputWatch(needed, time.monotonic(), self._watch.publishers_text)
         if self.settings(RecordingOptions).record:
@@ -264,57 +311,57 @@ class EstimatorNode(ManagedNode):
 
     def on_input(self, name: str, data: bytes, lateness: int) -> None:
         """Take one message of an input, ``lateness`` [ns] after it was sent."""
-        began = time.perf_counter_ns()
         if not self.active:
             return
-        plan = self._plans[name]
+        received, taken = self.now(), self._bound[name]
+        plan = taken.plan
         try:
             message = plan.read(data)
         except ValueError as error:
-            self._on_malformed(name, error)
-            self._look_after_timers(began)
+            self._on_malformed(taken, error)
             return
-        received, before = self.now(), self._state
         sent = received - lateness if received > lateness else 0
-        self._sent.clear()
-        self._state = receive(self._machine, before, plan, message, received, self._send, sent)
+        receive(self._machine, self._state, plan, message, received, self._emits, sent)
         commands = self._send_rest(received) if self._has_rest else []
-        done = time.perf_counter_ns()
 
         # Nobody waits for what follows.
-        topic, type_name = self._topics[name], self._types[name]
-        self.recording.record(topic, type_name, received, data, sent)
+        recorder = self.recording.recorder
+        if recorder is not None:
+            recorder.record(taken.topic, taken.type_name, received, data, sent)
         if self.has_viewer:
-            self._newest_inputs[topic] = TopicMessage(topic, type_name, data)
+            self._newest_inputs[taken.topic] = TopicMessage(taken.topic, taken.type_name, data)
+        stamp = message.stamp
         if not plan.holds_records:
-            self._newest[name] = data
-        stamp = message.stamp if plan.holds_records else None
-        for listener in self._listeners[name]:
-            listener.on_input(name, stamp, lateness)
+            stamp, self._newest[name] = None, data
+        self._uncounted.append((taken, stamp, lateness))
         if self._sent:
-            self._record_answers(commands, done - began)
-            self._follow(before)
-            self.recording.flush_if_idle()
-        self._look_after_timers(done)
+            self._record_answers(commands, received)
+            self._follow(plan)
+            if recorder is not None:
+                recorder.flush_if_idle()
+        if received - self._watchdog_called > _STARVED:
+            self.call_overdue_timers()
 
-    def _on_malformed(self, name: str, error: ValueError) -> None:
-        for listener in self._listeners[name]:
-            listener.on_malformed(name)
-        self.get_logger().error(f'{self._topics[name]}: {error}', throttle_duration_sec=1.0)
+    def _on_malformed(self, taken: _Input, error: ValueError) -> None:
+        for statistics in taken.statistics:
+            statistics.on_malformed(taken.plan.topic)
+        self.get_logger().error(f'{taken.topic}: {error}', throttle_duration_sec=1.0)
+        self.call_overdue_timers()
 
-    def _send(self, name: str, answer: Output, frame_id: bytes) -> None:
+    def _send(self, outputs: Mapping[type, _Output], answer: Output, frame_id: bytes) -> None:
         """Publish an answer at once, if it is a message of its own; the rest waits until all answers are out."""
-        data = frame_id
-        if not self._file.together:
-            data = encode(answer, frame_id)
-            self._publish[name, type_of(answer)](data)
-        self._sent.append((name, answer, data))
+        output, data = outputs[type(answer)], frame_id
+        if output.publish is not None:
+            data = output.encode(answer, frame_id)
+            output.publish(data)
+        self._sent.append((output, answer, data))
 
     def _send_rest(self, received: int) -> list[Command]:
         """Publish the answers to a message that are one, and what the controllers take, which is returned."""
         self._together = b''
         if self._file.together and self._sent:
-            self._together = encode_together([NamedAnswer(*one) for one in self._sent])
+            named = [NamedAnswer(output.actuator, answer, frame_id) for output, answer, frame_id in self._sent]
+            self._together = encode_together(named)
             self._publish['', MACHINE_TYPE](self._together)
         guided = FeedForward in [type(answer) for _, answer, _ in self._sent]
         commands = due_commands(self._machine, self._state, guided, received)
@@ -322,33 +369,37 @@ class EstimatorNode(ManagedNode):
             self._publish['', command.topic](command.data)
         return commands
 
-    def _record_answers(self, commands: list[Command], latency: int = 0) -> None:
-        """Record and count what was sent, ``latency`` [ns] after its input was taken."""
-        for name, answer, data in self._sent:
-            kind, statistics = type_of(answer), self._statistics[name]
-            if not self._together:
-                self.recording.record(self._topics[name, kind], kind, self.now(), data)
-            if kind == layouts.ESTIMATE_TYPE:
-                statistics.on_estimate(answer, latency)
-            else:
-                statistics.on_feedforward(answer)
+    def _record_answers(self, commands: list[Command], received: int) -> None:
+        """Record and count what was sent in answer to what was ``received`` [ns]."""
+        recorder, done = self.recording.recorder, self.now()
+        for output, answer, data in self._sent:
+            if recorder is not None and output.publish is not None:
+                recorder.record(output.topic, output.type_name, done, data)
+            self._uncounted.append((output, answer, done - received))
+        self._sent.clear()
         if self._together:
-            self.recording.record(self._topics['', MACHINE_TYPE], MACHINE_TYPE, self.now(), self._together)
+            self.recording.record(self._topics['', MACHINE_TYPE], MACHINE_TYPE, done, self._together)
         for command in commands:
-            self.recording.record(command.topic, full_name(command.type_name), self.now(), command.data)
+            self.recording.record(command.topic, full_name(command.type_name), done, command.data)
 
-    def _follow(self, before: MachineState) -> None:
-        """Follow pressures and adaptation of the actuators that have answered."""
-        states = zip(self._machine.actuators, before.actuators, self._state.actuators, strict=True)
-        for number, (actuator, known, newest) in enumerate(states):
-            if newest is known:
-                continue
-            if actuator.wiring.pressure:
-                self._lowest[number] = self._lowest[number].after(newest.pipeline.pressure)
-            parameters = actuator.pipeline.estimator
-            if parameters.adapts:
-                turn = newest.pipeline.turn_since(known.pipeline)
-                self._statistics[actuator.name].on_adaptation(turn)
+    def _follow(self, plan: TopicPlan) -> None:
+        """Follow pressures and adaptation of the actuators that have taken a message."""
+        for number, _ in plan.taken:
+            known = self._state.actuators[number].pipeline
+            if self._machine.actuators[number].wiring.pressure:
+                self._lowest[number] = self._lowest[number].after(known.pressure)
+            learnt, last = known.estimator.adaptation, self._learnt[number]
+            if learnt is not last:
+                self._learnt[number] = learnt
+                turn = known.turn_since(last)
+                if turn is not None:
+                    self._statistics[self._machine.actuators[number].name].on_turn(turn)
+
+    def _count(self) -> None:
+        """Count the messages since the last call, all in one go: between two samples it would delay the next one."""
+        uncounted, self._uncounted = self._uncounted, []
+        for taken_or_sent, message, duration in uncounted:
+            taken_or_sent.count(message, duration)
 
     def on_watchdog(self) -> bool:
         """Renew each feed-forward that no velocity sample renews, so that it fades out."""
@@ -362,11 +413,10 @@ class EstimatorNode(ManagedNode):
     def _tick(self, number: int, received: int) -> None:
         made, plan = self._state.actuators[number].pipeline.feedforward.received, self._ticks[number]
         tick = WatchdogTick(received + self._clock_offset, (received - made) * 1e-9)
-        self._sent.clear()
-        self._state = receive(self._machine, self._state, plan, tick, received, self._send)
+        receive(self._machine, self._state, plan, tick, received, self._emits)
         commands = self._send_rest(received) if self._has_rest else []
         self.recording.record(plan.topic, TICK_TYPE, received, encode(tick))
-        self._record_answers(commands)
+        self._record_answers(commands, received)
 
     def fade_out(self) -> None:
         """Fade every force to 0 N within ``fade_time``, whatever comes."""
@@ -393,7 +443,7 @@ class EstimatorNode(ManagedNode):
         self._inputs[name] = self.create_subscription(
             message_class(self._types[name]),
             name,
-            with_source_time(partial(self._on_message, name)),
+            with_info(partial(self._on_message, name)),
             profile,
             raw=True,
             qos_overriding_options=overriding,
@@ -405,30 +455,35 @@ class EstimatorNode(ManagedNode):
 
     def _record_only(self, topic: str, type_name: str) -> None:
         """Subscribe to a topic that no input uses, for the bag: `tune` takes the command of a controller from it."""
-
-        def record(data: bytes, source: int, _: int) -> None:
-            """Record one message."""
-            if self.active:
-                received = self.now()
-                sent = max(received - _lateness(source), 0)
-                self.recording.record(topic, type_name, received, data, sent)
-
-        kind, callback, profile = message_class(type_name), with_source_time(record), qos.best_effort(qos.STREAM)
+        kind, callback, profile = (
+            message_class(type_name),
+            with_info(partial(self._on_recorded, topic, type_name)),
+            qos.best_effort(qos.STREAM),
+        )
         self._recorded_only.append(self.create_subscription(kind, topic, callback, profile, raw=True))
 
-    def _on_message(self, name: str, data: bytes, source: int, received: int) -> None:
-        """Take a message that was sent at ``source`` [ns, system clock], and those that wait behind a late one.
+    def _on_recorded(self, topic: str, type_name: str, message: Any, info: Any = None) -> None:
+        """Record a message of a topic that no input uses; arguments after the type as of `with_info`."""
+        data, info = message if info is None else (message, info)
+        if self.active:
+            received = self.now()
+            sent = max(received - _lateness(info['source_timestamp']), 0)
+            self.recording.record(topic, type_name, received, data, sent)
 
-        A ``source`` of 0 is not known. The middleware received the message at ``received`` [ns].
-        """
-        lateness, now = time.time_ns() - source if source else 0, time.perf_counter_ns()
+    def _on_message(self, name: str, message: Any, info: Any = None) -> None:
+        """Take a message, and those that wait behind a late one; arguments after the name as of `with_info`."""
+        data, info = message if info is None else (message, info)
+        source = info['source_timestamp']
+        lateness = time.time_ns() - source if source else 0
         if lateness > _BACKLOG:
-            self._sorts_until = now + _SORTING
-        if now >= self._sorts_until:
+            self._sorts_until = time.perf_counter_ns() + _SORTING
+        if not self._sorts_until:
             self.on_input(name, data, lateness)
             return
-        for _, of, its_data, its_source in self._backlog((received, name, data, source)):
+        for _, of, its_data, its_source in self._backlog((info['received_timestamp'], name, data, source)):
             self.on_input(of, its_data, _lateness(its_source))
+        if time.perf_counter_ns() >= self._sorts_until:
+            self._sorts_until = 0
 
     def _backlog(self, first: tuple[int, str, bytes, int]) -> list[tuple[int, str, bytes, int]]:
         """A message and all that wait in the middleware, in order of their receipt there.
@@ -467,9 +522,10 @@ class EstimatorNode(ManagedNode):
 
         Graph and clocks have no timer of their own: each call of one wakes two threads.
         """
-        now = self._watchdog_called = time.perf_counter_ns()
+        now, self._watchdog_called = time.perf_counter_ns(), self.now()
         if self.on_watchdog():
             self._ticked = now
+        self._count()
         self.publish_newest()
         self._apply_due_change()
         is_ticking = self.has_viewer or now - self._ticked < _TICKING
@@ -479,11 +535,6 @@ class EstimatorNode(ManagedNode):
         if now - self._watched >= _WATCH_PERIOD:
             self._watched = now
             self._look_at_graph()
-
-    def _look_after_timers(self, now: int) -> None:
-        """Call what is overdue at ``now`` [ns of `time.perf_counter_ns`], if the watchdog was not called for long."""
-        if now - self._watchdog_called > _STARVED:
-            self.call_overdue_timers()
 
     def publish_newest(self) -> None:
         """Publish the newest messages for the live view, if there is one: 100 a second and not thousands."""
@@ -632,6 +683,7 @@ class EstimatorNode(ManagedNode):
     def _reset_adaptation(self) -> tuple[bool, str]:
         for known in self._state.actuators:
             known.pipeline.estimator.adaptation = NOT_ADAPTED
+        self._learnt = [NOT_ADAPTED for _ in self._learnt]
         for statistics in self._statistics.values():
             statistics.on_reset()
         self.publish_configuration()  # a replay forgets at the same message
@@ -648,6 +700,7 @@ class EstimatorNode(ManagedNode):
 
     def diagnostics(self) -> dict[str, DiagnosticStatus]:
         """Status of each actuator, of the inputs and outputs, and of the recorder."""
+        self._count()
         silent = dict.fromkeys(name for statistics in self._statistics.values() for name in statistics.silent_inputs)
         graph = self._watch.findings(list(silent), retry=self.active)
         self._refuse_inputs(graph.duplicates)
@@ -674,6 +727,7 @@ class EstimatorNode(ManagedNode):
 
     def _arrived(self) -> Mapping[str, int]:
         """Messages of each input; none of one whose messages never had the numbers that an actuator wants."""
+        self._count()
         numbers, newest = range(len(self._machine.actuators)), self._newest.items()
         lacking = {t for t, data in newest if any(missing(self._machine, number, t, data) for number in numbers)}
         self._complete |= self._newest.keys() - lacking
@@ -683,6 +737,7 @@ class EstimatorNode(ManagedNode):
 
     def end_interval(self) -> None:
         """Start a new interval of rates and latencies."""
+        self._count()
         for statistics in self._statistics.values():
             statistics.start_interval()
 
@@ -695,6 +750,7 @@ class EstimatorNode(ManagedNode):
 
     def _on_health_timer(self) -> None:
         """Publish indicators of the seals of each actuator whose adaptation learns."""
+        self._count()
         found = {}
         for actuator, known in zip(self._machine.actuators, self._state.actuators if self.active else (), strict=False):
             parameters, statistics = actuator.pipeline.estimator, self._statistics[actuator.name]

@@ -2,29 +2,20 @@
 
 import inspect
 import sys
-from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 _TWO = inspect.Signature([inspect.Parameter(name, inspect.Parameter.POSITIONAL_ONLY) for name in ('message', 'info')])
 
 
-def with_source_time(callback: Callable[[Any, int, int], None]) -> Callable[..., None]:
-    """Callback for rclpy that calls ``callback`` with a message, and when it was sent and received by the middleware.
+def with_info(callback: partial[None]) -> partial[None]:
+    """A callback that rclpy gives what the middleware knows of a message, too.
 
-    Both times are [ns] of the system clocks of sender and receiver.
-
-    rclpy gives the information about a message to a callback of two arguments; its events executor gives both as one
-    tuple.
+    It comes as a second argument, from the events executor of rclpy as the second part of the message.
+    ``source_timestamp`` and ``received_timestamp`` in it are [ns] of the system clocks of sender and receiver.
     """
-
-    def call(message: Any, info: Any = None) -> None:
-        """What rclpy calls."""
-        if info is None:
-            message, info = message
-        callback(message, info['source_timestamp'], info['received_timestamp'])
-
-    vars(call)['__signature__'] = _TWO
-    return call
+    vars(callback)['__signature__'] = _TWO
+    return callback
 
 
 def taken(subscription: Any, most: int = sys.maxsize) -> list[tuple[bytes, dict[str, Any]]]:

@@ -46,6 +46,6 @@ class CountedEstimator(FrictionEstimator):
         super().fade_out()
         self.clock = kept
 
-    def _send(self, name: str, answer: Output, frame_id: bytes) -> None:
-        super()._send(name, answer, frame_id)
+    def _send(self, outputs: Any, answer: Output, frame_id: bytes) -> None:
+        super()._send(outputs, answer, frame_id)
         self.sent += 1

@@ -2,7 +2,7 @@
 
 ``state = init(parameters)``, then ``receive(parameters, state, message, received, emit)`` for every message, in order
 of receipt. The node passes a function that publishes, replay one that collects. The state of an actuator is one mutable
-record of small immutable ones; each stage takes and returns its own. Who may have to go back keeps a ``state.copy()``.
+record of small immutable ones; each stage takes and returns its own. Who may have to go back has `PipelineState.kept`.
 
 A velocity sample makes an estimate with the newest pressure and force sum, and, once there has been a reference, a
 feed-forward. The estimate is emitted before anything is learnt from its sample, and before the feed-forward is
@@ -29,7 +29,7 @@ from operator import attrgetter
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation import estimator
-from seal_friction_ros.core.estimation.adaptation import bounded_friction
+from seal_friction_ros.core.estimation.adaptation import AdaptationState, bounded_friction
 from seal_friction_ros.core.estimation.conditioned_velocity import (
     NOT_CONDITIONED,
     SETTLING,
@@ -141,23 +141,34 @@ class PipelineState:
     temperature: SealTemperature = NO_TEMPERATURE
     clock: int = NEVER  # [ns] newest simulated time
 
+    def kept(self) -> tuple[tuple[Any, ...], ...]:
+        """All values, for `restore`."""
+        return _VALUES(self), _ESTIMATOR(self.estimator), _TIMES(self.receipt)
+
+    def restore(self, kept: tuple[tuple[Any, ...], ...]) -> None:
+        """Go back to what was `kept`."""
+        records: tuple[Any, ...] = self, self.estimator, self.receipt
+        for record, values in zip(records, kept, strict=True):
+            for one, value in zip(fields(record), values, strict=True):
+                setattr(record, one.name, value)
+
     def copy(self) -> 'PipelineState':
         """The same state, which does not change with this one."""
         copied = PipelineState(*_VALUES(self))
         copied.estimator, copied.receipt = self.estimator.copy(), ReceiptTimes(*_TIMES(self.receipt))
         return copied
 
-    def turn_since(self, before: 'PipelineState') -> Turn | None:
-        """The end of a stroke between the state before a message and this one, if the adaptation learns from it."""
-        last, learnt = before.estimator.adaptation.strokes, self.estimator.adaptation.strokes
-        if learnt is last:
+    def turn_since(self, last: AdaptationState) -> Turn | None:
+        """The end of a stroke between what was ``last`` learnt and now, if the adaptation learns from it."""
+        before, now = last.strokes, self.estimator.adaptation.strokes
+        if now.present.direction == before.present.direction and now.reversals == before.reversals:
             return None
-        if learnt.present.direction == last.present.direction and learnt.reversals == last.reversals:
-            return None
-        return Turn(before.estimator, self.estimator)
+        return Turn(dataclasses.replace(self.estimator, adaptation=last), self.estimator)
 
 
-_VALUES, _TIMES = (attrgetter(*(one.name for one in fields(kind))) for kind in (PipelineState, ReceiptTimes))
+_VALUES, _ESTIMATOR, _TIMES = (
+    attrgetter(*(one.name for one in fields(kind))) for kind in (PipelineState, EstimatorState, ReceiptTimes)
+)
 
 
 def init(parameters: PipelineParameters) -> PipelineState:
@@ -191,7 +202,7 @@ def receive(
         sent: When its publisher sent it [ns], on the clock of ``received``; None: just then.
     """
     since = acting_since(parameters.feedforward, received, received if sent is None else sent)
-    _RECEIVERS[type(message)](parameters, state, message, received, since, emit)
+    RECEIVERS[type(message)](parameters, state, message, received, since, emit)
 
 
 def no_answer(_record: Output, _frame_id: bytes) -> None:
@@ -333,7 +344,7 @@ def receive_position(
     """Nothing depends on the position; it is recorded to show how the servo tracks."""
 
 
-_RECEIVERS: dict[type, Callable[[Any, PipelineState, Any, int, int, Any], None]] = {
+RECEIVERS: dict[type, Callable[[Any, PipelineState, Any, int, int, Any], None]] = {
     Velocity: receive_velocity,
     Pressure: receive_pressure,
     Force: receive_force,
@@ -343,6 +354,7 @@ _RECEIVERS: dict[type, Callable[[Any, PipelineState, Any, int, int, Any], None]]
     Clock: receive_clock,
     WatchdogTick: receive_tick,
 }
+"""What takes each kind of message, see `receive`; the fifth argument is what `acting_since` gives."""
 
 
 def is_tick_due(state: PipelineState, now: int) -> bool:

@@ -1,7 +1,7 @@
 """A machine of several actuators: raw messages in, answers of each actuator out.
 
-``state = init(machine)``, then ``state = receive(machine, state, plan, plan.read(data), received, emit)`` for the bytes
-of every message, live and in replay alike. A message is read once, whatever it holds for whichever actuator. A message
+``state = init(machine)``, then ``receive(machine, state, plan, plan.read(data), received, emits)`` for the bytes of
+every message, live and in replay alike. A message is read once, whatever it holds for whichever actuator. A message
 of this project is a record of the estimator already (`record_plan`). What another message holds becomes records
 (`records_of`), and those take the path of one actuator (`pipeline.receive`) in this order: temperature, pressure,
 force, position, reference, velocity, since the velocity makes the estimate.
@@ -25,7 +25,13 @@ from typing import Any, NamedTuple
 from seal_friction_ros.core.estimation import pipeline
 from seal_friction_ros.core.estimation.configuration import Configuration
 from seal_friction_ros.core.estimation.feedforward import newest_force
-from seal_friction_ros.core.estimation.pipeline import ZERO_CELSIUS, PipelineParameters, PipelineState
+from seal_friction_ros.core.estimation.pipeline import (
+    RECEIVERS,
+    ZERO_CELSIUS,
+    PipelineParameters,
+    PipelineState,
+    acting_since,
+)
 from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.machine.differentiator import NO_WINDOW, Differentiator, Window, differentiate
 from seal_friction_ros.core.machine.machine_file import Actuator, ForceSum, LoadTable, MachineFile, Signal
@@ -142,7 +148,8 @@ class Memory(NamedTuple):
     reference_window: Window = NO_WINDOW
 
 
-class ActuatorState(NamedTuple):
+@dataclass(slots=True)
+class ActuatorState:
     """What one message leaves for the next, of one actuator."""
 
     pipeline: PipelineState
@@ -261,49 +268,53 @@ def receive(
     plan: TopicPlan,
     message: Any,
     received: int,
-    emit: Emit,
+    emits: Sequence[pipeline.Emit],
     sent: int | None = None,
-) -> MachineState:
-    """Take one message; the next state.
+) -> None:
+    """Take one message.
 
     Args:
         machine: From `make_machine`.
-        state: From `init` or the message before; not to be used again.
+        state: From `init` or of the message before; it becomes the next state.
         plan: Of the topic of the message: one of ``machine.plans``, or `record_plan` of a tick or simulated time.
         message: As ``plan.read`` makes it.
         received: When it was received [ns], on the clock of `pipeline.receive`.
-        emit: Called with each answer.
+        emits: Called with the answers of each actuator, see `named_emits`.
         sent: When its publisher sent it [ns], as `pipeline.receive`.
     """
-    if type(message) in KEPT:  # two of three messages: nothing in them can fail half-way
-        for number, _ in plan.taken:
-            parameters, kept = machine.actuators[number].pipeline, state.actuators[number].pipeline
-            pipeline.receive(parameters, kept, message, received, pipeline.no_answer, sent)
-        return state
-    states = list(state.actuators)
     for number, taken in plan.taken:
-        actuator, known = machine.actuators[number], states[number]
-        memory: Memory = known.memory
+        actuator, known = machine.actuators[number], state.actuators[number]
+        parameters, running = actuator.pipeline, known.pipeline
+        since = acting_since(parameters.feedforward, received, received if sent is None else sent)
+        if type(message) in KEPT:  # two of three messages: nothing in them can fail half-way
+            RECEIVERS[type(message)](parameters, running, message, received, since, pipeline.no_answer)
+            continue
+        memory, made, kept = known.memory, running.feedforward, running.kept()  # all or nothing
         records: Sequence[Input] = (message,)
-        after = known.pipeline.copy()  # all or nothing
-        named = partial(emit, actuator.mapping.name)
         try:
             if taken:
-                stamp = message.stamp if message.stamp is not None else stamp_of(actuator, after, received, sent)
+                stamp = message.stamp
+                if stamp is None:
+                    stamp = stamp_of(running, received, since)
                 memory, records = records_of(actuator, memory, taken, message.numbers, stamp, message.frame_id)
             for record in records:
-                pipeline.receive(actuator.pipeline, after, record, received, named, sent)
+                RECEIVERS[type(record)](parameters, running, record, received, since, emits[number])
         except (ArithmeticError, ValueError) as error:
-            states[number] = known._replace(force=0.0, fault=f'{plan.topic}: {type(error).__name__}: {error}')
+            running.restore(kept)
+            known.force, known.fault = 0.0, f'{plan.topic}: {type(error).__name__}: {error}'
             continue
-        force = known.force if after.feedforward is known.pipeline.feedforward else newest_force(after.feedforward)
-        states[number] = ActuatorState(after, memory, force)
-    return MachineState(tuple(states))
+        known.memory, known.fault = memory, ''
+        if running.feedforward is not made:
+            known.force = newest_force(running.feedforward)
 
 
-def stamp_of(actuator: MachineActuator, known: PipelineState, received: int, sent: int | None) -> int:
-    """Stamp [ns] of a message that has none: when it was sent, if it came in time."""
-    since = NEVER if sent is None else pipeline.acting_since(actuator.pipeline.feedforward, received, sent)
+def named_emits(machine: Machine, emit: Emit) -> list[pipeline.Emit]:
+    """For `receive`: what calls ``emit`` with each answer of an actuator, its name first."""
+    return [partial(emit, actuator.name) for actuator in machine.actuators]
+
+
+def stamp_of(known: PipelineState, received: int, since: int) -> int:
+    """Stamp [ns] of a message that has none: when it was sent, if it came in time; ``since`` as of `acting_since`."""
     return (received if since == NEVER else since) + known.clock_offset
 
 

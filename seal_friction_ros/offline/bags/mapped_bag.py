@@ -7,11 +7,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 from seal_friction_ros.core.estimation.configuration import Configuration
+from seal_friction_ros.core.estimation.pipeline import acting_since
 from seal_friction_ros.core.machine.machine import (
     Machine,
     MachineState,
     init,
     make_machine,
+    named_emits,
     receive,
     records_of,
     stamp_of,
@@ -104,6 +106,7 @@ def machine_messages(bag: Path, mapping: MappingFile | None, *, with_answers: bo
         kind = coder.type_of(record)
         answers.append((f'/{name}/{LAST_PART[kind]}', kind, coder.encode(record, frame_id)))
 
+    emits = named_emits(machine, collect)
     text = coder.encode_text(machine_text(snapshot_of(machine, state)))
     for number, message in enumerate(read_messages(bag)):
         if number == 0:
@@ -113,7 +116,7 @@ def machine_messages(bag: Path, mapping: MappingFile | None, *, with_answers: bo
             if with_answers:
                 plan = machine.plans[message.topic]
                 with named(bag, message):
-                    state = receive(machine, state, plan, plan.read(message.data), message.log_time, collect)
+                    receive(machine, state, plan, plan.read(message.data), message.log_time, emits)
                 yield from (BagMessage(topic, kind, message.log_time, data) for topic, kind, data in answers)
                 answers.clear()
         elif message.type_name not in (*coder.DECODERS, layouts.MACHINE_TYPE):
@@ -130,7 +133,7 @@ class Translation:
     def __init__(
         self, machine: Machine, state: MachineState, only: str = '', malformed: Counter[str] | None = None
     ) -> None:
-        self._actuators, self._states = machine.actuators, list(state.actuators)
+        self._actuators, self._states = machine.actuators, [replace(one) for one in state.actuators]
         self.malformed: Counter[str] = Counter() if malformed is None else malformed
         self._plans = {
             topic: plan._replace(taken=tuple(one for one in plan.taken if only in ('', machine.actuators[one[0]].name)))
@@ -161,18 +164,20 @@ class Translation:
             actuator, known = self._actuators[number], self._states[number]
             stamp = reading.stamp
             if stamp is None:
-                stamp = stamp_of(actuator, known.pipeline, received, message.publish_time)
+                since = acting_since(actuator.pipeline.feedforward, received, message.publish_time or received)
+                stamp = stamp_of(known.pipeline, received, since)
             try:
                 memory, made = records_of(actuator, known.memory, taken, reading.numbers, stamp, reading.frame_id)
             except (ArithmeticError, ValueError):
                 continue  # as the node: the actuator does not take the message
-            self._states[number] = known._replace(memory=memory)
+            known.memory = memory
             yield from ((number, record, reading.frame_id) for record in made)
 
     def follow(self, clock: Clock, received: int) -> None:
         """Follow simulated time."""
         offset = clock.stamp - received
-        self._states = [one._replace(pipeline=replace(one.pipeline, clock_offset=offset)) for one in self._states]
+        for one in self._states:
+            one.pipeline = replace(one.pipeline, clock_offset=offset)
 
 
 def is_for(mapping: MappingFile, infos: Mapping[str, TopicInfo]) -> bool:

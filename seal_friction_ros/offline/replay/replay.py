@@ -4,10 +4,11 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from seal_friction_ros.core.estimation import pipeline
 from seal_friction_ros.core.estimation.configuration import Configuration, SealSelection
 from seal_friction_ros.core.estimation.estimator import DEFAULT_ADAPTATION, EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
-from seal_friction_ros.core.machine.machine import Machine, MachineState, TopicPlan, receive, record_plan
+from seal_friction_ros.core.machine.machine import Machine, MachineState, TopicPlan, named_emits, receive, record_plan
 from seal_friction_ros.core.machine.machine_file import MachineFile
 from seal_friction_ros.core.machine.machine_snapshot import (
     MachineSnapshot,
@@ -98,6 +99,7 @@ class Replay:
         """topics that the bag of a replay keeps, besides the answers"""
         self._topic_of: dict[tuple[str, str], str] = {}  # name of an actuator and message type -> topic
         self._plans: dict[str, TopicPlan] = {}
+        self._emits: Sequence[pipeline.Emit] = ()
         self._machine: Machine | None = None
         self._state: MachineState | None = None
         self._tells_sending = False
@@ -178,6 +180,7 @@ class Replay:
             self._plans = dict(self._machine.plans)
             self._topic_of = {('', kind): topic or ANSWER_TOPICS[kind] for kind, topic in topics.answers.items()}
             self.kept = {*topics, rosbag.CONFIGURATION_TOPIC, self._state_topic}
+        self._emits = named_emits(self._machine, self._collect)
         outputs = {one.output.topic: full_name(one.output.type_name) for one in file.actuators if one.output}
         self.answers = {topic: kind for (_, kind), topic in self._topic_of.items()} | outputs
         present = {topic for topic, info in self.topics.items() if info.message_count and topic in self.kept}
@@ -217,9 +220,7 @@ class Replay:
             with rosbag.named(self._bag, message):
                 raise
         self._made.clear()
-        self._state = receive(
-            self._machine, self._state, plan, record, message.log_time, self._collect, message.publish_time
-        )
+        receive(self._machine, self._state, plan, record, message.log_time, self._emits, message.publish_time)
         return self._encoded(self._machine, self._state, message.log_time)
 
     def _collect(self, name: str, answer: Output, frame_id: bytes) -> None:

@@ -44,9 +44,8 @@ class Run:
     def take(self, topic, data, received):
         self.answers = []
         plan = self.machine.plans[topic]
-        self.state = m.receive(
-            self.machine, self.state, plan, plan.read(data), received, lambda *answer: self.answers.append(answer)
-        )
+        emits = m.named_emits(self.machine, lambda *answer: self.answers.append(answer))
+        m.receive(self.machine, self.state, plan, plan.read(data), received, emits)
 
     def estimates(self):
         return {name: record for name, record, _ in self.answers if isinstance(record, FrictionEstimate)}
@@ -203,7 +202,7 @@ def test_what_a_message_lacks_is_said():
 
 def test_an_actuator_whose_arithmetic_fails_leaves_the_others_alone_and_commands_nothing(monkeypatch):
     run, whole = excavator(), excavator()
-    receive = m.pipeline.receive
+    receive = m.RECEIVERS[Velocity]
 
     def fails(parameters, *others):
         if parameters is run.machine.actuators[0].pipeline:
@@ -212,11 +211,28 @@ def test_an_actuator_whose_arithmetic_fails_leaves_the_others_alone_and_commands
 
     data = message('sensor_msgs/JointState', 700 * MS, name=['boom', 'arm', 'bucket'], velocity=[0.1, 0.0, -0.1])
     whole.take('/joint_states', data, 700 * MS)
-    monkeypatch.setattr(m.pipeline, 'receive', fails)
+    monkeypatch.setitem(m.RECEIVERS, Velocity, fails)
     run.take('/joint_states', data, 700 * MS)
     assert run.answers == [answer for answer in whole.answers if answer[0] != 'boom']
     assert run.state.actuators[0].force == 0.0
     assert 'too large' in run.state.actuators[0].fault
+
+
+def test_a_message_that_fails_half_way_changes_nothing(monkeypatch):
+    run = bench_run(velocity=0.1)
+    kept, (known,), receive = run.state.actuators[0].pipeline.kept(), run.state.actuators, m.RECEIVERS[Velocity]
+    memory = known.memory
+
+    def fails(*arguments):
+        receive(*arguments)
+        raise OverflowError('too large')
+
+    monkeypatch.setitem(m.RECEIVERS, Velocity, fails)
+    joints = {'name': ['axis'], 'velocity': [0.2], 'position': [0.031]}
+    run.take('/joint_states', message('sensor_msgs/JointState', 301 * MS, **joints), 301 * MS)
+    assert len(run.answers) > 0
+    assert (known.pipeline.kept(), known.memory, known.force) == (kept, memory, 0.0)
+    assert known.fault == '/joint_states: OverflowError: too large'
 
 
 def test_bytes_that_are_no_message_are_refused_and_change_nothing():
@@ -250,7 +266,7 @@ def test_a_run_that_goes_on_from_its_written_memory_gives_the_same_answers():
     (known,) = run.state.actuators
     written = json.loads(json.dumps(m.memory_document(known.memory)))
     again = Run(run.machine)
-    again.state = m.MachineState((known._replace(memory=m.parse_memory(written)),))
+    again.state = m.MachineState((replace(known, memory=m.parse_memory(written), pipeline=known.pipeline.copy()),))
     joints = {'name': ['axis'], 'position': [0.05 * 0.301], 'velocity': [0.0]}
     data = message('sensor_msgs/JointState', 301 * MS, **joints)
     for one in (run, again):
@@ -267,7 +283,7 @@ def test_the_watchdog_lets_every_actuator_fade_out():
         now = 600 * MS + i * 10 * MS
         for number in m.due(run.state, now):
             plan, tick = m.record_plan('/watchdog_tick', TICK_TYPE, (number,)), WatchdogTick(now, 0.01)
-            run.state = m.receive(run.machine, run.state, plan, tick, now, lambda *_: None)
+            m.receive(run.machine, run.state, plan, tick, now, m.named_emits(run.machine, lambda *_: None))
     assert [state.force for state in run.state.actuators] == [0.0, 0.0, 0.0]
 
 
@@ -530,8 +546,8 @@ def test_a_reference_of_positions_has_the_velocity_between_the_last_two_up_to_20
 
 def test_a_message_without_a_stamp_has_that_of_its_receipt_on_the_clock_of_the_stamps():
     run = Run(made(EXCAVATOR))
-    states = [one._replace(pipeline=replace(one.pipeline, clock_offset=500)) for one in run.state.actuators]
-    run.state = m.MachineState(tuple(states))
+    for one in run.state.actuators:
+        one.pipeline.clock_offset = 500
     for topic in ('/a', '/b'):
         run.take(topic, message('std_msgs/Float64MultiArray', data=[20.0, 30.0, 40.0]), 7)
     assert run.state.actuators[0].pipeline.pressure == Pressure(507, 2e6, 2e6)

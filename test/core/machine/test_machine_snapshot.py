@@ -24,36 +24,36 @@ DEFINITIONS = {kind: installed(kind) for kind in MACHINE.file.topics.values()}
 NAMES = ['boom', 'arm', 'bucket']
 
 
-def passed(machine, state, topic, data, received, answers):
-    """State after one message."""
-    plan = machine.plans[topic]
-    return m.receive(machine, state, plan, plan.read(data), received, lambda *answer: answers.append(answer))
+def take(machine, state, topic, data, received, answers):
+    """Take one message."""
+    plan, emits = machine.plans[topic], m.named_emits(machine, lambda *answer: answers.append(answer))
+    m.receive(machine, state, plan, plan.read(data), received, emits)
 
 
-def taken(machine, state, first, last):
-    """State and answers after some milliseconds."""
+def answers_of(machine, state, first, last):
+    """Answers of some milliseconds."""
     answers = []
     for i in range(first, last):
         for topic in ('/a', '/b'):
             data = message('std_msgs/Float64MultiArray', data=[20.0, 30.0, 40.0])
-            state = passed(machine, state, topic, data, i * MS, answers)
+            take(machine, state, topic, data, i * MS, answers)
         for topic in ('/set', '/joint_states'):
             data = message('sensor_msgs/JointState', i * MS, name=NAMES, velocity=[0.1, 0.0, -0.1])
-            state = passed(machine, state, topic, data, i * MS, answers)
-    return state, answers
+            take(machine, state, topic, data, i * MS, answers)
+    return answers
 
 
 def test_a_restored_machine_gives_the_same_answers_to_the_bit():
-    state, _ = taken(MACHINE, m.init(MACHINE), 1, 150)
+    state = m.init(MACHINE)
+    answers_of(MACHINE, state, 1, 150)
     text = machine_text(snapshot_of(MACHINE, state))
     again, restored = machine_of(parse_machine_text(text), DEFINITIONS)
     assert again.file == MACHINE.file
     assert [one.force for one in restored.actuators] == [one.force for one in state.actuators]
     assert restored.actuators[0].force > 1.0
-    (further, answers), (as_was, expected) = taken(again, restored, 150, 160), taken(MACHINE, state, 150, 160)
-    assert answers == expected != []
-    assert machine_text(snapshot_of(again, further)) == machine_text(snapshot_of(MACHINE, as_was))
     assert machine_text(snapshot_of(again, restored)) == text
+    assert answers_of(again, restored, 150, 160) == answers_of(MACHINE, state, 150, 160) != []
+    assert machine_text(snapshot_of(again, restored)) == machine_text(snapshot_of(MACHINE, state)) != text
 
 
 def test_the_snapshot_of_one_actuator_is_a_machine_of_one():
@@ -64,8 +64,8 @@ def test_the_snapshot_of_one_actuator_is_a_machine_of_one():
     assert set(machine.plans) == set(INPUTS)
     assert machine_text(snapshot_of(machine, state)) == text
     answers = []
-    state = passed(machine, state, 'cylinder_pressure', encode(Pressure(1, 2e6, 1e6)), 1, answers)
-    state = passed(machine, state, 'rod_velocity', encode(Velocity(2, 0.1, b'rod')), 2, answers)
+    take(machine, state, 'cylinder_pressure', encode(Pressure(1, 2e6, 1e6)), 1, answers)
+    take(machine, state, 'rod_velocity', encode(Velocity(2, 0.1, b'rod')), 2, answers)
     assert [(name, record.stamp, frame_id) for name, record, frame_id in answers] == [('', 2, b'rod')]
     assert (
         parse_machine_text(machine_text(snapshot_of(machine, state))).actuators[''].snapshot.state.pressure.stamp == 1

@@ -1,13 +1,11 @@
 """Commands for controllers, read back by rclpy."""
 
-from dataclasses import replace
-
 import pytest
 import yaml
 from harness.machines import EXCAVATOR, made, message_class, parsed
 from rclpy.serialization import deserialize_message
 
-from seal_friction_ros.core.machine.machine import MachineState, init
+from seal_friction_ros.core.machine.machine import init
 from seal_friction_ros.core.machine.machine_file import parse_machine
 from seal_friction_ros.core.machine.outputs import check_outputs, commands, due_commands
 
@@ -102,12 +100,12 @@ def test_actuators_with_places_of_their_own_are_accepted():
 def test_commands_are_due_after_a_feed_forward_or_a_fault_on_the_clock_of_the_stamps():
     machine = made(EXCAVATOR)
     state = init(machine)
-    offset = [one._replace(pipeline=replace(one.pipeline, clock_offset=500), force=2.0) for one in state.actuators]
-    state = MachineState(tuple(offset))
+    for one in state.actuators:
+        one.pipeline.clock_offset, one.force = 500, 2.0
     assert due_commands(machine, state, False, STAMP) == []
     assert due_commands(machine, state, True, STAMP) == commands(machine.file, dict.fromkeys(NAMES, 2.0), STAMP + 500)
-    failed = MachineState((*offset[:2], offset[2]._replace(fault='too large', force=0.0)))
-    (command,) = due_commands(machine, failed, False, STAMP)
+    state.actuators[2].fault, state.actuators[2].force = 'too large', 0.0
+    (command,) = due_commands(machine, state, False, STAMP)
     assert list(read(command).data) == [2.0, 2.0, 0.0]
     with_header = parsed(EXCAVATOR, output={'topic': '/command', 'type': 'sensor_msgs/msg/JointState', 'joint': 'b'})
     (first, _) = commands(with_header, {}, STAMP + 500)
