@@ -313,7 +313,7 @@ def test_after_a_gap_of_more_than_100_ms_or_a_step_back_acceleration_and_strokes
         assert after.filter == state.filter
 
 
-def test_a_sample_is_due_every_8_ms_and_after_time_went_back():
+def test_a_sample_is_due_every_10_ms_and_after_time_went_back():
     state = NOT_ADAPTED._replace(stamp=START)
     assert not is_due(state, START)
     assert not is_due(state, START + LEARNING_INTERVAL - 1)
