@@ -269,7 +269,7 @@ class EstimatorNode(ManagedNode):
         self._receipt_offset = time.time_ns() - time.monotonic_ns()
         self._watchdog_called = self.now()
         needed = [name for name in self._types if name not in _OPTIONAL_INPUTS]
-        self._input_watch = InputWatch(needed, time.monotonic(), self._watch.publishers_text)
+        self._input_watch = InputWatch(needed, time.monotonic(), self._about_input)
         if self.settings(RecordingOptions).record:
             self._start_recording()
         else:
@@ -724,6 +724,14 @@ class EstimatorNode(ManagedNode):
         for topic, data in self._newest.items():
             said += [f'{topic}: {text}' for text in missing(self._machine, number, topic, data)]
         return said + pressure_remarks(self._file, self._file.actuators[number], self._lowest[number])
+
+    def _about_input(self, topic: str) -> str:
+        """Why an input is not there: what its newest message lacks, else its publishers."""
+        data, numbers = self._newest.get(topic), range(len(self._machine.actuators))
+        lacking = (
+            [] if data is None else [one for number in numbers for one in missing(self._machine, number, topic, data)]
+        )
+        return lacking[0] if lacking else self._watch.publishers_text(topic)
 
     def _arrived(self) -> Mapping[str, int]:
         """Messages of each input; none of one whose messages never had the numbers that an actuator wants."""

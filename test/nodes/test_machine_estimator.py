@@ -199,6 +199,7 @@ def test_an_input_whose_messages_are_empty_has_not_arrived(tmp_path, capfd):
             return words in remarks
 
         assert nodes.spin_until(lambda: said('waiting for /joint_states'))
+        assert 'waiting for /joint_states (velocity[boom]: velocity has 0 elements)' in remarks
         assert 'has arrived' not in remarks
         move(nodes, drivers, 3)
         assert nodes.spin_until(lambda: 'every input that is needed has arrived' in ''.join(capfd.readouterr()))

@@ -1,5 +1,6 @@
 """The SROS2 policy allows what the running nodes have, and nothing else: neither can drift from the other."""
 
+import re
 from contextlib import contextmanager
 from xml.etree import ElementTree
 
@@ -54,6 +55,23 @@ def running(kind, values):
 def test_the_policy_is_what_the_nodes_have(name):
     policy = POLICY.read_text()
     assert rights_of(*WIRINGS[name], name) == allowed(policy, name)
+
+
+OF_EVERY_NODE = ('/transition_event', '/parameter_events', '/rosout')
+
+
+@pytest.mark.parametrize('name', WIRINGS)
+def test_topics_in_the_docs_are_those_of_the_node(name):
+    page = (ROOT / 'docs' / 'interfaces.md').read_text()
+    section = page.split(f'## Node `{name}`')[1].split('\n## ')[0].split('\n| service |')[0]
+    documented: dict[str, set[str]] = {'in': set(), 'out': set()}
+    for topics, about in re.findall(r'^\| (`.+`) \| .+? \| (.+) \|$', section, re.MULTILINE):
+        for way in re.findall(r'\b(in|out)\b', about.split(':')[0]) if 'in bags only' not in about else ():
+            documented[way] |= {topic.replace('~', f'/{name}') for topic in re.findall(r'`(\S+?)`', topics)}
+    rights = allowed(POLICY.read_text(), name)
+    for way, right in (('in', 'subscribe'), ('out', 'publish')):
+        found = {topic for topic in rights[right] if not topic.endswith(OF_EVERY_NODE)}
+        assert {topic if topic[0] == '/' else f'/{topic}' for topic in documented[way]} == found
 
 
 def test_the_policy_of_a_machine_is_what_its_node_has(tmp_path):
