@@ -2,7 +2,7 @@
 
 import time
 from collections import Counter, deque
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Sequence
 from functools import reduce
 from operator import or_
 
@@ -61,13 +61,17 @@ class MissingSamples:
         self._shortest = self._longest = 0.0  # between them a step is of the period; both 0.0 until that is learnt
         self._steps: deque[int] = deque(maxlen=15)
 
-    def on_stamp(self, stamp: int) -> None:
-        """Add the stamp [ns] of the next sample."""
-        step = stamp - self._stamp if self._stamp else 0
-        if self._shortest < step < self._longest:  # as nearly all
-            self._stamp = stamp
-            self._steps.append(step)
-            return
+    def on_stamps(self, stamps: Iterable[int]) -> None:
+        """Add the stamps [ns] of the next samples."""
+        for stamp in stamps:
+            step = stamp - self._stamp if self._stamp else 0
+            if self._shortest < step < self._longest:  # as nearly all
+                self._stamp = stamp
+                self._steps.append(step)
+            else:
+                self._on_irregular(stamp, step)
+
+    def _on_irregular(self, stamp: int, step: int) -> None:
         if -_LARGEST_DELAY <= step < 0:
             self.count = max(self.count - 1, 0)
             self._count_before -= 1
@@ -124,30 +128,30 @@ class EstimatorDiagnostics:
         self._lateness: dict[str, int] = {}  # [ns] the largest of each input in this interval
         self._clock_moved = False
 
-    def on_input(self, name: str, stamp: int | None, lateness: int = 0) -> None:
-        """Count one message of an input, ``lateness`` [ns] after its sending; negative if the clocks differ.
+    def on_inputs(self, name: str, messages: Sequence[tuple[int | None, int]]) -> None:
+        """Count messages of an input, at least one: stamp and lateness [ns] of each; negative if the clocks differ.
 
-        A ``stamp`` [ns] of None: the stamps do not tell what is missing, or there are none.
+        A stamp of None: the stamps do not tell what is missing, or there are none.
         """
-        self._received[name] += 1
-        if stamp is not None:
-            self._missing[name].on_stamp(stamp)
-        if abs(lateness) > abs(self._lateness.get(name, 0)):
-            self._lateness[name] = lateness
-        if name == CLOCK_TOPIC and stamp is not None and stamp != self._clock:
-            self._clock, self._clock_moved = stamp, True
+        self._received[name] += len(messages)
+        stamps = [stamp for stamp, _ in messages if stamp is not None]
+        self._missing[name].on_stamps(stamps)
+        self._lateness[name] = max(self._lateness.get(name, 0), *(late for _, late in messages), key=abs)
+        if name == CLOCK_TOPIC and stamps[-1:] not in ([], [self._clock]):
+            self._clock, self._clock_moved = stamps[-1], True
 
     def on_malformed(self, name: str) -> None:
         """Count one message of an input that cannot be decoded."""
         self._malformed[name] += 1
 
-    def on_estimate(self, estimate: FrictionEstimate, latency: int) -> None:
-        """Count one estimate, made ``latency`` [ns] after its velocity was taken."""
-        self._by_status[estimate.status] += 1
-        self._latencies.append(latency)
-        self._starts = seal_health.with_sample(self._starts, estimate)
-        self._estimate = self._newest[FrictionEstimate] = estimate
-        self._status |= estimate.status
+    def on_estimates(self, estimates: Sequence[tuple[FrictionEstimate, int]]) -> None:
+        """Count estimates, at least one, each with the time [ns] after its velocity was taken."""
+        self._by_status.update(status := [estimate.status for estimate, _ in estimates])
+        self._latencies += [latency for _, latency in estimates]
+        for estimate, _ in estimates:
+            self._starts = seal_health.with_sample(self._starts, estimate)
+        self._estimate = self._newest[FrictionEstimate] = estimates[-1][0]
+        self._status = reduce(or_, status, self._status)
 
     def on_turn(self, turn: Turn) -> None:
         """Follow what was learnt from a stroke."""
@@ -164,18 +168,19 @@ class EstimatorDiagnostics:
         level = DiagnosticStatus.WARN if said else DiagnosticStatus.OK
         return status_of(level, '; '.join(said) or 'no finding', values)
 
-    def on_feedforward(self, feedforward: FeedForward, _latency: int = 0) -> None:
-        """Count one feed-forward."""
-        self._feedforwards_by_limit[feedforward.limited] += 1
-        force, before = feedforward.force, self._feedforward_force
-        self._travel += abs(force - before)
-        if force * self._feedforward_sign < 0.0:
-            self._reversals += 1
-        if force:
-            self._feedforward_sign = force
-        self._feedforward_force = force
-        self._newest[FeedForward] = feedforward
-        self._limited |= feedforward.limited
+    def on_feedforwards(self, feedforwards: Sequence[tuple[FeedForward, int]]) -> None:
+        """Count feed-forwards, at least one, as `on_estimates`."""
+        self._feedforwards_by_limit.update(limited := [one.limited for one, _ in feedforwards])
+        for feedforward, _ in feedforwards:
+            force = feedforward.force
+            self._travel += abs(force - self._feedforward_force)
+            if force * self._feedforward_sign < 0.0:
+                self._reversals += 1
+            if force:
+                self._feedforward_sign = force
+            self._feedforward_force = force
+        self._newest[FeedForward] = feedforwards[-1][0]
+        self._limited = reduce(or_, limited, self._limited)
 
     def take_newest(self) -> list[records.Output]:
         """The newest answers since the last call, for who looks on: each with the bits of all answers since then."""

@@ -2,9 +2,10 @@
 
 import sys
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from operator import itemgetter
 from typing import Any, NamedTuple
 
@@ -87,11 +88,7 @@ class _Input(NamedTuple):
     topic: str
     type_name: str
     statistics: list[EstimatorDiagnostics]  # of the actuators that take it
-
-    def count(self, stamp: int | None, lateness: int) -> None:
-        """Count one message, as `EstimatorDiagnostics.on_input`."""
-        for each in self.statistics:
-            each.on_input(self.plan.topic, stamp, lateness)
+    uncounted: list[tuple[int | None, int]]  # stamp and lateness [ns] of each message since the last `_count`
 
 
 class _Output(NamedTuple):
@@ -102,7 +99,8 @@ class _Output(NamedTuple):
     type_name: str
     encode: Callable[[Output, bytes], bytes]
     publish: Callable[[bytes], None] | None  # None: the answers of all actuators are one message
-    count: Callable[[Any, int], None]
+    count: Callable[[Sequence[tuple[Any, int]]], None]
+    uncounted: list[tuple[Output, int]]  # each since the last `_count`, and when [ns] after its input it was sent
 
 
 class EstimatorNode(ManagedNode):
@@ -120,9 +118,10 @@ class EstimatorNode(ManagedNode):
     def __init__(self, name: str, groups: tuple[ParameterGroup, ...], **kwargs: Any) -> None:
         self._mapping: MachineFile | None = None
         self._sent: list[tuple[_Output, Output, bytes]] = []  # where to, answer, its bytes or frame name
-        self._uncounted: list[tuple[_Input | _Output, Any, int]] = []  # of each message since the last `_count`
         self._together = b''
         self._newest: dict[str, bytes] = {}
+        self._bound: dict[str, _Input] = {}  # by name
+        self._sending: list[dict[type, _Output]] = []  # of each actuator, by the record of an answer
         self._complete: set[str] = set()  # topics that had all numbers of all actuators in a message
         self._logged_errors: dict[str, str] = {}
         self._inputs: dict[str, Any] = {}
@@ -233,27 +232,26 @@ class EstimatorNode(ManagedNode):
             actuator.name: EstimatorDiagnostics([t for t in self._types if number in dict(self._plans[t].taken)])
             for number, actuator in enumerate(self._file.actuators)
         }
-        self._uncounted.clear()
         self._lowest = [Lowest() for _ in self._statistics]
 
     def _bind(self) -> None:
         """Look up once what each message needs."""
         every = list(self._statistics.values())
-        self._bound = {}
         for name, kind in self._types.items():
             plan = self._plans[name]
             taking = [every[number] for number, _ in plan.taken]
-            self._bound[name] = _Input(plan, self._topics[name], kind, taking)
-        self._emits = [partial(self._send, self._outputs_of(*item)) for item in self._statistics.items()]
+            self._bound[name] = _Input(plan, self._topics[name], kind, taking, [])
+        self._sending = [self._outputs_of(*item) for item in self._statistics.items()]
+        self._emits = [partial(self._send, outputs) for outputs in self._sending]
         self._learnt = [known.pipeline.estimator.adaptation for known in self._state.actuators]
 
     def _outputs_of(self, name: str, statistics: EstimatorDiagnostics) -> dict[type, _Output]:
-        counts = {FrictionEstimate: statistics.on_estimate, FeedForward: statistics.on_feedforward}
+        counts = {FrictionEstimate: statistics.on_estimates, FeedForward: statistics.on_feedforwards}
         found = {}
         for record, count in counts.items():
             key = name, TYPES[record]
             topic, publish = self._topics.get(key, ''), self._publish.get(key)
-            found[record] = _Output(name, topic, key[1], ENCODERS[record], publish, count)
+            found[record] = _Output(name, topic, key[1], ENCODERS[record], publish, count, [])
         return found
 
     def start(self) -> None:
@@ -313,12 +311,12 @@ class EstimatorNode(ManagedNode):
         """Take one message of an input, ``lateness`` [ns] after it was sent."""
         if not self.active:
             return
-        received, taken = self.now(), self._bound[name]
-        plan = taken.plan
+        received, heard = self.now(), self._bound[name]
+        plan = heard.plan
         try:
             message = plan.read(data)
         except ValueError as error:
-            self._on_malformed(taken, error)
+            self._on_malformed(heard, error)
             return
         sent = received - lateness if received > lateness else 0
         receive(self._machine, self._state, plan, message, received, self._emits, sent)
@@ -327,13 +325,13 @@ class EstimatorNode(ManagedNode):
         # Nobody waits for what follows.
         recorder = self.recording.recorder
         if recorder is not None:
-            recorder.record(taken.topic, taken.type_name, received, data, sent)
+            recorder.record(heard.topic, heard.type_name, received, data, sent)
         if self.has_viewer:
-            self._newest_inputs[taken.topic] = TopicMessage(taken.topic, taken.type_name, data)
+            self._newest_inputs[heard.topic] = TopicMessage(heard.topic, heard.type_name, data)
         stamp = message.stamp
         if not plan.holds_records:
             stamp, self._newest[name] = None, data
-        self._uncounted.append((taken, stamp, lateness))
+        heard.uncounted.append((stamp, lateness))
         if self._sent:
             self._record_answers(commands, received)
             self._follow(plan)
@@ -342,10 +340,10 @@ class EstimatorNode(ManagedNode):
         if received - self._watchdog_called > _STARVED:
             self.call_overdue_timers()
 
-    def _on_malformed(self, taken: _Input, error: ValueError) -> None:
-        for statistics in taken.statistics:
-            statistics.on_malformed(taken.plan.topic)
-        self.get_logger().error(f'{taken.topic}: {error}', throttle_duration_sec=1.0)
+    def _on_malformed(self, heard: _Input, error: ValueError) -> None:
+        for statistics in heard.statistics:
+            statistics.on_malformed(heard.plan.topic)
+        self.get_logger().error(f'{heard.topic}: {error}', throttle_duration_sec=1.0)
         self.call_overdue_timers()
 
     def _send(self, outputs: Mapping[type, _Output], answer: Output, frame_id: bytes) -> None:
@@ -375,7 +373,7 @@ class EstimatorNode(ManagedNode):
         for output, answer, data in self._sent:
             if recorder is not None and output.publish is not None:
                 recorder.record(output.topic, output.type_name, done, data)
-            self._uncounted.append((output, answer, done - received))
+            output.uncounted.append((answer, done - received))
         self._sent.clear()
         if self._together:
             self.recording.record(self._topics['', MACHINE_TYPE], MACHINE_TYPE, done, self._together)
@@ -397,9 +395,14 @@ class EstimatorNode(ManagedNode):
 
     def _count(self) -> None:
         """Count the messages since the last call, all in one go: between two samples it would delay the next one."""
-        uncounted, self._uncounted = self._uncounted, []
-        for taken_or_sent, message, duration in uncounted:
-            taken_or_sent.count(message, duration)
+        for heard in self._bound.values():
+            for statistics in heard.statistics if heard.uncounted else ():
+                statistics.on_inputs(heard.plan.topic, heard.uncounted)
+            heard.uncounted.clear()
+        for output in chain.from_iterable(outputs.values() for outputs in self._sending):
+            if output.uncounted:
+                output.count(output.uncounted)
+                output.uncounted.clear()
 
     def on_watchdog(self) -> bool:
         """Renew each feed-forward that no velocity sample renews, so that it fades out."""

@@ -20,11 +20,11 @@ PERIOD = 1_000_000  # [ns]
 def test_samples_lost_in_bursts_are_counted_from_the_first_samples_on(loss, seed):
     chance, missing, lost = np.random.default_rng(seed), MissingSamples(), 0
     number = last = 1
-    missing.on_stamp(number * PERIOD)
+    missing.on_stamps([number * PERIOD])
     for _ in range(500):
         burst = int(chance.exponential(4.0)) if chance.random() < loss / 4.0 else 0
         number += 1 + burst
-        missing.on_stamp(number * PERIOD + int(chance.uniform(-0.01, 0.01) * PERIOD))
+        missing.on_stamps([number * PERIOD + int(chance.uniform(-0.01, 0.01) * PERIOD)])
         lost += number - last - 1
         last = number
     assert missing.count == lost
@@ -34,7 +34,7 @@ def level_of(bit: Status, share: float) -> tuple[bytes, str]:
     """Level and message of a second in which this share of the estimates had the bit."""
     diagnostics = EstimatorDiagnostics()
     for i in range(100):
-        diagnostics.on_estimate(NO_ESTIMATE._replace(status=int(bit) if i < 100 * share else 0), 1000)
+        diagnostics.on_estimates([(NO_ESTIMATE._replace(status=int(bit) if i < 100 * share else 0), 1000)])
     report = diagnostics.report(True, False, GraphFindings(dict.fromkeys(INPUTS, 1), [], [], {}))
     return report.level, report.message
 
@@ -50,7 +50,7 @@ def test_slow_motion_as_each_reversal_has_it_is_no_warning_and_a_quarter_of_a_se
 def test_a_velocity_that_hums_is_named():
     diagnostics, watched = EstimatorDiagnostics(), GraphFindings(dict.fromkeys(INPUTS, 1), [], [], {})
     for i in range(100):
-        diagnostics.on_estimate(NO_ESTIMATE._replace(status=int(Status.MOTION_UNCERTAIN) if i < 50 else 0), 1000)
+        diagnostics.on_estimates([(NO_ESTIMATE._replace(status=int(Status.MOTION_UNCERTAIN) if i < 50 else 0), 1000)])
     known = init(default_configuration().parameters().estimator)
     known.swing = NO_SWING._replace(doubted=64e-6)
     report = diagnostics.report(True, False, watched, known=known)
@@ -68,9 +68,9 @@ def test_each_bit_has_its_share_and_none_hides_what_limits_the_force():
     diagnostics = EstimatorDiagnostics()
     for number in range(100):
         status = Status.FORCE_STALE * (number < 3) | Status.PRESSURE_OUT_OF_RANGE
-        diagnostics.on_estimate(NO_ESTIMATE._replace(status=int(status)), 1000)
+        diagnostics.on_estimates([(NO_ESTIMATE._replace(status=int(status)), 1000)])
         limited = Limited.CLAMP * (number < 98) | Limited.FADE * (number < 76)
-        diagnostics.on_feedforward(FeedForward(number, 1.0, 0.9, int(limited)))
+        diagnostics.on_feedforwards([(FeedForward(number, 1.0, 0.9, int(limited)), 0)])
     diagnostics.on_malformed('force_sum')
     message = diagnostics.report(True, False, GOOD).message
     for words in (
@@ -87,13 +87,13 @@ def test_who_looks_on_gets_the_newest_answers_with_the_bits_of_all_since_the_las
     statistics = EstimatorDiagnostics()
     assert statistics.take_newest() == []
     for number, (status, limited) in enumerate([(0, 0), (int(Status.FORCE_STALE), int(Limited.CLAMP)), (0, 0)]):
-        statistics.on_estimate(NO_ESTIMATE._replace(stamp=number, status=status), 1)
-        statistics.on_feedforward(FeedForward(number, float(number), 0.9, limited))
+        statistics.on_estimates([(NO_ESTIMATE._replace(stamp=number, status=status), 1)])
+        statistics.on_feedforwards([(FeedForward(number, float(number), 0.9, limited), 0)])
     estimate, feedforward = statistics.take_newest()
     assert (estimate.stamp, estimate.status) == (2, Status.FORCE_STALE)
     assert (feedforward.force, feedforward.limited) == (2.0, Limited.CLAMP)
     assert statistics.take_newest() == []
-    statistics.on_estimate(NO_ESTIMATE, 1)
+    statistics.on_estimates([(NO_ESTIMATE, 1)])
     assert [answer.status for answer in statistics.take_newest()] == [0]
 
 
@@ -104,8 +104,8 @@ def reported(lateness: list[int]) -> tuple[DiagnosticStatus, EstimatorDiagnostic
     """Report of a second whose velocities came so long [ms] after they were sent."""
     diagnostics = EstimatorDiagnostics()
     for number, late in enumerate(lateness):
-        diagnostics.on_input('rod_velocity', number * PERIOD, late * PERIOD)
-        diagnostics.on_estimate(NO_ESTIMATE._replace(stamp=number * PERIOD), 1000)
+        diagnostics.on_inputs('rod_velocity', [(number * PERIOD, late * PERIOD)])
+        diagnostics.on_estimates([(NO_ESTIMATE._replace(stamp=number * PERIOD), 1000)])
     return diagnostics.report(True, False, GOOD), diagnostics
 
 
@@ -142,15 +142,15 @@ def test_simulated_time_that_stands_still_is_an_error_after_a_second_without_new
     diagnostics = EstimatorDiagnostics([*INPUTS, CLOCK_TOPIC])
     watched = GraphFindings(dict.fromkeys([*INPUTS, CLOCK_TOPIC], 1), [], [], {})
     for stamp in times:
-        diagnostics.on_input(CLOCK_TOPIC, stamp)
+        diagnostics.on_inputs(CLOCK_TOPIC, [(stamp, 0)])
     clock = 1.0
     diagnostics.start_interval()
-    diagnostics.on_estimate(NO_ESTIMATE, 1000)
+    diagnostics.on_estimates([(NO_ESTIMATE, 1000)])
     for stamp in times[-1:]:
-        diagnostics.on_input(CLOCK_TOPIC, stamp)
+        diagnostics.on_inputs(CLOCK_TOPIC, [(stamp, 0)])
     clock = 2.0
     report = diagnostics.report(True, False, watched)
     assert report.level == DiagnosticStatus.ERROR
     assert report.message.startswith('simulated time stands still')
-    diagnostics.on_input(CLOCK_TOPIC, 8)
+    diagnostics.on_inputs(CLOCK_TOPIC, [(8, 0)])
     assert 'stands still' not in diagnostics.report(True, False, watched).message

@@ -245,20 +245,20 @@ def acting_since(settings: FeedForwardSettings, received: int, sent: int) -> int
 def receive_velocity(parameters: Any, state: Any, velocity: Any, received: int, since: int, emit: Any) -> None:
     """An estimate, and with a reference a feed-forward."""
     settings, stamp, made = parameters.feedforward, velocity.stamp, state.feedforward.received
-    is_new = state.estimator.stamp != stamp
+    running, receipt = state.estimator, state.receipt
+    is_new = running.stamp != stamp
     sample = RodSample(
         stamp=stamp, velocity=velocity.velocity, pressure=state.pressure, force=state.force, refused=state.refused,
         stamp_age=(received + state.clock_offset - stamp) * 1e-9, temperature=state.temperature,
-        is_late=since == NEVER or _stands_still(state.clock, state.receipt, received, settings.estimate_timeout),
+        is_late=since == NEVER or _stands_still(state.clock, receipt.clock, received, settings.estimate_timeout),
     )  # fmt: skip
-    estimate, seen, friction = estimate_at(parameters.estimator, state.estimator, sample)
+    estimate, seen, friction = estimate_at(parameters.estimator, running, sample)
     send(emit, estimate, velocity.frame_id)
-    known = state.estimator.adaptation
-    state.estimator.adaptation = learn_from(parameters.estimator, known, estimate, seen, friction)
+    running.adaptation = learn_from(parameters.estimator, running.adaptation, estimate, seen, friction)
     if is_new and since != NEVER and not estimate.status & NO_VELOCITY:
-        state.receipt.velocity = since
+        receipt.velocity = since
     state.friction = estimate.coulomb_friction if usable(settings, estimate) else -1.0
-    is_guided = state.receipt.reference != NEVER or settings.use_measured_velocity
+    is_guided = receipt.reference != NEVER or settings.use_measured_velocity
     is_soon = since == NEVER and made != NEVER and received - made < TICK_INTERVAL
     if is_guided and not is_soon:
         _feed_forward(parameters, state, stamp, received, velocity.frame_id, emit)
@@ -405,7 +405,7 @@ def _feed_forward(parameters: Any, state: Any, stamp: int, received: int, frame_
     ground, timeout = state.friction, settings.estimate_timeout
     if state.refused or not _is_fresh(receipt, received, timeout):
         ground = -1.0
-    if _stands_still(state.clock, receipt, received, timeout):
+    if _stands_still(state.clock, receipt.clock, received, timeout):
         ground = -1.0
     if turns and not is_wanted:  # a reference that came late: the force fades on its side
         ground = -1.0
@@ -457,15 +457,16 @@ def _reference_motion(
 @compilable
 def _is_fresh(receipt: Any, received: int, timeout: float) -> bool:
     """Whether every input of the estimator that ever came has come within ``timeout`` [s]."""
-    if receipt.force != NEVER and not _is_younger(receipt.force, received, timeout):
-        return False
-    return _is_younger(receipt.velocity, received, timeout) and _is_younger(receipt.pressure, received, timeout)
+    oldest = receipt.velocity if receipt.velocity < receipt.pressure else receipt.pressure
+    if receipt.force != NEVER and receipt.force < oldest:
+        oldest = receipt.force
+    return _is_younger(oldest, received, timeout)
 
 
 @compilable
-def _stands_still(clock: int, receipt: Any, received: int, timeout: float) -> bool:
+def _stands_still(clock: int, receipt: int, received: int, timeout: float) -> bool:
     """Whether there is simulated time and it has not moved for ``timeout`` [s], or never did."""
-    return clock != NEVER and not _is_younger(receipt.clock, received, timeout)
+    return clock != NEVER and not _is_younger(receipt, received, timeout)
 
 
 @compilable
