@@ -238,10 +238,9 @@ class EstimatorNode(ManagedNode):
         """Look up once what each message needs."""
         every = list(self._statistics.values())
         for name, kind in self._types.items():
-            plan = self._plans[name]
-            taking = [every[number] for number, _ in plan.taken]
-            self._bound[name] = _Input(plan, self._topics[name], kind, taking, [])
-        self._sending = [self._outputs_of(*item) for item in self._statistics.items()]
+            taking = [every[number] for number, _ in self._plans[name].taken]
+            self._bound[name] = _Input(self._plans[name], self._topics[name], kind, taking, [])
+        self._sending = [self._outputs_of(*named) for named in self._statistics.items()]
         self._emits = [partial(self._send, outputs) for outputs in self._sending]
         self._learnt = [known.pipeline.estimator.adaptation for known in self._state.actuators]
 
@@ -387,11 +386,9 @@ class EstimatorNode(ManagedNode):
             if self._machine.actuators[number].wiring.pressure:
                 self._lowest[number] = self._lowest[number].after(known.pressure)
             learnt, last = known.estimator.adaptation, self._learnt[number]
-            if learnt is not last:
-                self._learnt[number] = learnt
-                turn = known.turn_since(last)
-                if turn is not None:
-                    self._statistics[self._machine.actuators[number].name].on_turn(turn)
+            self._learnt[number] = learnt
+            if learnt is not last and (turn := known.turn_since(last)):
+                self._statistics[self._machine.actuators[number].name].on_turn(turn)
 
     def _count(self) -> None:
         """Count the messages since the last call, all in one go: between two samples it would delay the next one."""
