@@ -39,9 +39,8 @@ DIGITS = 8  # of a computed number in a seal file
 ON_OTHER_MESHES = (
     'normal_force_N', 'wall_force_N', 'peak_contact_stress_Pa', 'contact_width_m', 'area_deformation_gain',
     'radial_force_N', 'friction_N', 'shear_stress_Pa', 'knee_stress_Pa', 'film_out_m', 'film_back_m',
-    'leakage_m3_per_m',
 )  # fmt: skip
-"""Numbers of an `OringSummary` that are compared with those of other meshes."""
+"""Numbers of an `OringSummary` that are compared with those of other meshes; the leakage is a difference of two."""
 
 
 @dataclass(frozen=True)
@@ -261,8 +260,8 @@ def seal_document(computed: Computed, spread: Spread | None = None) -> dict[str,
     found = friction.uncertainty.relative_std if spread is None else spread.relative_std
     pressures = [rounded(value, DIGITS) for value in computed.summary.pressure_Pa]
     readings = f' Shear law: {len(computed.task.readings)} readings of this ring.' if computed.task.readings else ''
-    mesh = computed.mesh.text if computed.mesh else f'Contact on one mesh of {file.case.numerics.lines} lines.'
-    source = f'{file.source} Contact: finite elements. {mesh}{readings}'
+    mesh = f' {computed.mesh.text}' if computed.mesh else ''
+    source = f'{file.source} Contact: finite elements, {file.case.numerics.lines} lines.{mesh}{readings}'
     speeds = [reading.speed for reading in computed.task.readings]
     return {
         'name': file.case.name,

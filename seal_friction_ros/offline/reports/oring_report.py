@@ -135,7 +135,6 @@ _ON_OTHER_MESHES = {
     'friction_N': 'friction',
     'film_out_m': 'film out',
     'film_back_m': 'film back',
-    'leakage_m3_per_m': 'leakage',
 }
 
 
