@@ -90,7 +90,7 @@ def main() -> None:
     for document in documents:
         if len(sys.argv) < 2 or sys.argv[1] in document['name']:
             path = FOLDER / f'{document["name"]}.yaml'
-            computed = compute_file(parse_oring_case(document), path, Task(for_seal_file=True))
+            computed = compute_file(parse_oring_case(document), path, Task(for_seal_file=True, meshes=True))
             comment = 'Made by tools/make_catalogue.py; see docs/seal_from_drawing.md.\n'
             write_seal(seal_document(computed), path, comment + seal_comment(computed).partition('\n')[2])
 

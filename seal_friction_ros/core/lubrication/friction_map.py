@@ -20,7 +20,7 @@ from seal_friction_ros.core.lubrication.model import (
     profile_model,
     solid_limit,
 )
-from seal_friction_ros.core.lubrication.oring_film import oring_film
+from seal_friction_ros.core.lubrication.oring_film import oring_film, oring_films
 from seal_friction_ros.core.lubrication.shear import real_area_share
 from seal_friction_ros.core.oring_contact.ring_friction import DISCRETISATION
 
@@ -125,7 +125,22 @@ def steady_friction(case: LubricationCase, pressure: float) -> SteadyFriction:
 
     NotConvergedError: a film did not converge; the message says at which speed and pressure.
     """
-    model, begin, stiffness = _at_rest(case, pressure)
+    return _steady(case, pressure, _at_rest(case, pressure))
+
+
+def steady_rows(case: LubricationCase) -> list[SteadyFriction]:
+    """`steady_friction` at each pressure of the grid; an O-ring is loaded once, from pressure to pressure."""
+    pressures = tuple(map_pressures(case.map).tolist())
+    if case.oring is None:
+        return [steady_friction(case, pressure) for pressure in pressures]
+    films = oring_films(case, case.oring, pressures)
+    return [_steady(case, pressure, film) for pressure, film in zip(pressures, films, strict=True)]
+
+
+def _steady(
+    case: LubricationCase, pressure: float, rest: tuple[LubricationModel, ContactState, float]
+) -> SteadyFriction:
+    model, begin, stiffness = rest
     real_contact = float(real_area_share(model.contact, begin.gap).max())
     thinnest = float(begin.gap.min()) / case.topography.rms_height
     speeds = map_speeds(case.map)

@@ -22,7 +22,7 @@ from seal_friction_ros.core.oring_contact.equilibrium import (
     unstressed_state,
 )
 from seal_friction_ros.core.oring_contact.material import rubber_field
-from seal_friction_ros.core.oring_contact.mesh import o_grid
+from seal_friction_ros.core.oring_contact.mesh import CROWDING, o_grid
 from seal_friction_ros.core.oring_contact.oring_case import OringCase, check_pressures
 from seal_friction_ros.core.oring_contact.section import first_crossing, placed
 from seal_friction_ros.core.oring_contact.section_mesh import inside, section_mesh
@@ -52,8 +52,8 @@ class LoadedRing(NamedTuple):
     newton_steps: int  # since the last requested pressure
 
 
-def oring_model(case: OringCase) -> OringModel:
-    """Model of a case."""
+def oring_model(case: OringCase, crowding: float = CROWDING) -> OringModel:
+    """Model of a case; the ``crowding`` of the elements is that of a round ring, see `mesh`."""
     geometry, numerics = case.geometry, case.numerics
     if case.section is not None:
         section = placed(case.section, geometry.ring_inner_diameter, geometry.section_diameter)
@@ -64,7 +64,7 @@ def oring_model(case: OringCase) -> OringModel:
             field = rubber_field((case.rubber, case.cap or case.rubber), in_cap.astype(int))
         return make_model(mesh, case.rubber, geometry.section_diameter, 0.0, field)
     center = (geometry.ring_inner_diameter + geometry.section_diameter) / 2.0
-    mesh = o_grid(geometry.section_diameter, center, numerics.lines)
+    mesh = o_grid(geometry.section_diameter, center, numerics.lines, crowding)
     return make_model(mesh, case.rubber, geometry.section_diameter, numerics.guide)
 
 

@@ -25,18 +25,19 @@ class Mesh(NamedTuple):
     surface: IntArray  # nodes of the outline, counterclockwise from the one nearest to the axis, shape (s,)
 
 
-def o_grid(section_diameter: float, center_radius: float, lines: int) -> Mesh:
+def o_grid(section_diameter: float, center_radius: float, lines: int, crowding: float = CROWDING) -> Mesh:
     """O-grid of a circular section of diameter d [m], whose centre is ``center_radius`` [m] off the axis.
 
     So many grid ``lines`` end on the quarter of the outline that faces the rod; the same number face the gland, fewer
-    the wall and the fluid. ValueError: ``lines`` is below 5.
+    the wall and the fluid. With a ``crowding`` below 0 the edges are short at both ends of each side. ValueError:
+    ``lines`` is below 5.
     """
     if lines < 5:
         raise ValueError(f'o_grid: lines = {lines} is below 5: the contact would have one or two nodes')
     z_sides = lines - 1
     r_sides = max(2, round(AXIAL_SHARE * z_sides))
     layers = max(2, round(0.5 * z_sides))
-    position, index = _core(r_sides, z_sides)
+    position, index = _core(r_sides, z_sides, crowding)
     around = np.roll(outline_of(index), index.shape[1] // 2)  # from the middle of the side nearest to the axis
     circle = position[around] / np.linalg.norm(position[around], axis=1, keepdims=True)
     share = np.cumsum(np.geomspace(1.0, LAYER_RATIO, layers))
@@ -49,9 +50,10 @@ def o_grid(section_diameter: float, center_radius: float, lines: int) -> Mesh:
     return Mesh(center + section_diameter / 2.0 * np.concatenate(nodes), np.concatenate(blocks), rows[-1])
 
 
-def _core(r_sides: int, z_sides: int) -> tuple[FloatArray, IntArray]:
+def _core(r_sides: int, z_sides: int, crowding: float) -> tuple[FloatArray, IntArray]:
     """Nodes of the core of a unit circle, shape (n, 2), and their indices, shape (r_sides + 1, z_sides + 1)."""
-    grid = np.stack(np.meshgrid(_tangents(r_sides), _tangents(z_sides), indexing='ij'), axis=-1).reshape(-1, 2)
+    sides = [_tangents(count, crowding) for count in (r_sides, z_sides)]
+    grid = np.stack(np.meshgrid(*sides, indexing='ij'), axis=-1).reshape(-1, 2)
     level = np.abs(grid).max(axis=1, keepdims=True)
     length = np.linalg.norm(grid, axis=1, keepdims=True)
     length[length == 0.0] = 1.0
@@ -61,10 +63,10 @@ def _core(r_sides: int, z_sides: int) -> tuple[FloatArray, IntArray]:
     return position, np.arange(len(grid)).reshape(r_sides + 1, z_sides + 1)
 
 
-def _tangents(sides: int) -> FloatArray:
+def _tangents(sides: int, crowding: float) -> FloatArray:
     """Positions along a side of the core, -1 to 1, of the grid lines to the surface; denser in the middle."""
     even = np.linspace(-1.0, 1.0, sides + 1)
-    angle: FloatArray = np.pi / 4.0 * (even - CROWDING * np.sin(np.pi * even) / np.pi)
+    angle: FloatArray = np.pi / 4.0 * (even - crowding * np.sin(np.pi * even) / np.pi)
     return np.tan(angle)
 
 

@@ -53,9 +53,10 @@ def run(arguments: argparse.Namespace) -> int:
         for_seal_file=arguments.out is not None,
         for_samples=bool(samples),
         fluid=arguments.film,
+        meshes=True,
     )
     computed = compute_case(config_path('oring', arguments.case), task)
-    numbers, text, uncertainty = cli.json_value(computed.summary), numbers_text(computed), None
+    numbers, text, uncertainty = cli.json_value(computed.numbers()), numbers_text(computed), None
     if samples:
         from seal_friction_ros.offline.contact.sampling import uncertain_ring
 

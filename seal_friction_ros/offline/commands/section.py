@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.core.oring_contact.ring_friction import Reading
     from seal_friction_ros.offline.contact.oring_runs import Task, compute_file, seal_comment, seal_document
     from seal_friction_ros.offline.contact.section_files import read_tension
-    from seal_friction_ros.offline.contact.section_runs import Gland, case_of, mesh_levels, section_document
+    from seal_friction_ros.offline.contact.section_runs import Gland, case_of, section_document
     from seal_friction_ros.offline.reports.oring_report import numbers_text, write_oring_report
     from seal_friction_ros.offline.work.seal_writer import write_seal
 
@@ -78,13 +78,10 @@ def run(arguments: argparse.Namespace) -> int:
     pressures = sorted({0.0, *arguments.pressure})
     file = case_of(document, pressures, arguments.lines)
     readings = [Reading(*reading) for reading in arguments.reading]
-    computed = compute_file(
-        file, Path(arguments.drawing), Task(readings=readings, for_seal_file=True, fluid=arguments.film)
-    )
-    levels = mesh_levels(computed)
+    task = Task(readings=readings, for_seal_file=True, fluid=arguments.film, meshes=True)
+    computed = compute_file(file, Path(arguments.drawing), task)
     if arguments.report:
-        write_oring_report(computed, arguments.report, meshes=levels.text().strip())
+        write_oring_report(computed, arguments.report)
     if arguments.out:
         write_seal(seal_document(computed), arguments.out, seal_comment(computed))
-    numbers = cli.json_value(computed.summary) | {'mesh': levels._asdict()}
-    return cli.print_result(arguments, numbers, f'{numbers_text(computed)}\n{levels.text()}')
+    return cli.print_result(arguments, cli.json_value(computed.numbers()), numbers_text(computed))

@@ -28,23 +28,24 @@ from seal_friction_ros.core.lubrication.friction_map import (
     directions,
     friction_map,
     live_map,
-    map_pressures,
     memory_length,
     pressure_asymmetry,
     steady_friction,
+    steady_rows,
 )
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, parse_lubrication_case, varied_case
 from seal_friction_ros.core.oring_contact.oring_case_file import OringCaseFile, parse_oring_case
+from seal_friction_ros.core.oring_contact.ring_friction import DISCRETISATION
 from seal_friction_ros.files import config_path, read_yaml
+from seal_friction_ros.offline.contact.mesh_levels import COARSER, FINER, MOST_MESH_ERROR, change_of, other_lines
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty
 from seal_friction_ros.offline.work.executor import Workers
-from seal_friction_ros.offline.work.finished_parts import Kept, Part, part_key, run_parts, try_parts
+from seal_friction_ros.offline.work.finished_parts import Kept, Part, Values, part_key, try_parts
+from seal_friction_ros.offline.work.outcome import Outcome
 from seal_friction_ros.offline.work.seal_writer import rounded
 
 Parsed = TypeVar('Parsed')
-_FEWEST_CELLS, _FEWEST_LINES = 32, 9  # that a case may have, and a ring
-MOST_MESH_ERROR = 0.05  # [-] of a friction on the next mesh: more is said to be not converged
-MARKED_MESH_ERROR = 0.03  # [-] more has a mark on the page
+_FEWEST_CELLS = 32  # that a case may have
 LEAST_ASYMMETRY = 0.01  # [-] that a seal file has: less is an error of the mesh (our choice)
 STICTION_OF_A_RING = 0.13
 """[-] breakaway over sliding friction, less 1, of a map without speeds: mean of the thesis (our choice)"""
@@ -95,8 +96,7 @@ class MapRuns(NamedTuple):
     rows: list[SteadyFriction]
     retried_steps: int  # steps that did not converge and were repeated in halves
     mesh_error: FloatArray | None = None
-    """[-] change of each friction on the next finer mesh, on the next coarser one where that fails, NaN where both do,
-    shape (pressures, speeds); None: not computed"""
+    """[-] change of each friction as of `change_of`, shape (pressures, speeds); None: not computed"""
     uncertainty: Uncertainty | None = None  # None: no samples
 
     @property
@@ -126,12 +126,17 @@ class MapRuns(NamedTuple):
         """What the mesh changes, as a sentence; empty if that is not known."""
         if self.mesh_error is None:
             return ''
-        worst = np.nan_to_num(self.mesh_error, nan=np.inf)
+        worst, marked = self.mesh_error, self.mesh_error > DISCRETISATION
         i, j = np.unravel_index(int(worst.argmax()), worst.shape)
         where = f'at {1e3 * self.law.speeds[j]:.3g} mm/s and {self.law.pressures[i] / BAR:.3g} bar'
         if math.isinf(worst[i, j]):
             return f'Mesh: neither the finer nor the coarser one can be computed {where}: this number has no error.'
-        warning = '; above 5 % a number is not converged' if worst[i, j] > MOST_MESH_ERROR else ''
+        warning = ''
+        if marked.any():
+            at = 1e3 * np.array(self.law.speeds)[marked.any(axis=0)]
+            warning = f'; {marked.sum()} of {marked.size} by MORE THAN 3 %, at {at[0]:.3g} to {at[-1]:.3g} mm/s'
+        if worst[i, j] > MOST_MESH_ERROR:
+            warning += '; above 5 % a number is not converged'
         share = self.mesh_error_at_reference
         return (
             f'Mesh: the next one changes the friction by {100.0 * worst[i, j]:.2g} % at most, {where}, and by '
@@ -163,9 +168,8 @@ class MapRuns(NamedTuple):
             'gap_over_roughness_at_rest': [row.thinnest for row in self.rows],
             'speeds_in_seal_file': carries_film(self.rows),
             'retried_steps': self.retried_steps,
-            'mesh_error': None
-            if self.mesh_error is None
-            else [[None if math.isnan(value) else value for value in row] for row in self.mesh_error.tolist()],
+            'mesh_error': None if self.mesh_error is None else self.mesh_error.tolist(),
+            'mesh_marked': None if self.mesh_error is None else (self.mesh_error > DISCRETISATION).tolist(),
             **({} if self.uncertainty is None else {'uncertainty': self.uncertainty.numbers()}),
         }
 
@@ -184,49 +188,63 @@ def run_map(case: LubricationCase, workers: Workers, work: Path | None = None) -
     The folder ``work`` keeps finished parts, so that an interrupted map resumes; None keeps none.
     """
     known = varied_case(case, {})
-    memory_part = Part(part_key('memory', asdict(known)), MemoryLength._fields, partial(memory_length, known))
-    parts = [*row_parts(known), memory_part]
-    *found, kept_memory = run_parts(f'{case.name}: map', parts, workers, work, partial(compile_for_map, known))
-    rows, memory = [SteadyFriction(**row) for row in found], MemoryLength(**kept_memory)
-    retried = memory.retried_steps + sum(row.retried_steps for row in rows)
-    law = friction_map(case, rows, memory.length)
-    return MapRuns(case, law, rows, retried, mesh_error(known, rows, workers, work))
+    tables = [table_part(each) for each in (other_mesh(known, FINER), known, other_mesh(known, COARSER))]
+    memory = Part(part_key('memory', asdict(known)), MemoryLength._fields, partial(memory_length, known))
+    prepare = partial(compile_for_map, known)
+    finer, here, coarser, lag = try_parts(f'{case.name}: map', [*tables, memory], workers, Kept(work), prepare)
+    rows, lags = rows_of(needed(here)), MemoryLength(**needed(lag))
+    retried = lags.retried_steps + sum(row.retried_steps for row in rows)
+    law = friction_map(case, rows, lags.length)
+    levels = [_frictions(outcome, rows) for outcome in (coarser, here, finer)]
+    return MapRuns(case, law, rows, retried, change_of(*levels))
+
+
+def needed(outcome: Outcome[Values]) -> Values:
+    """Result of a part; ValueError: it failed."""
+    if outcome.result is None:
+        raise ValueError(outcome.error)
+    return outcome.result
+
+
+def _frictions(outcome: Outcome[Values], rows: Sequence[SteadyFriction]) -> FloatArray:
+    """Frictions of a table [N], shape (pressures, speeds); NaN of one that failed."""
+    if outcome.error:
+        return np.full((len(rows), len(rows[0].friction)), np.nan)
+    return np.asarray((outcome.result or {})['friction'])
 
 
 def other_mesh(case: LubricationCase, factor: float) -> LubricationCase:
-    """The case with ``factor`` times as many elements of the ring along the wall, or cells of another seal."""
+    """The case with ``factor`` times as many cells, and lines of the elements of a ring."""
+    cells = max(round(factor * case.numerics.cells), _FEWEST_CELLS)
+    case = replace(case, numerics=replace(case.numerics, cells=cells))
     if case.oring is None:
-        cells = max(round(factor * case.numerics.cells), _FEWEST_CELLS)
-        return replace(case, numerics=replace(case.numerics, cells=cells))
-    ring = case.oring
-    lines = max(round(factor * (ring.numerics.lines - 1)) + 1, _FEWEST_LINES)
-    return replace(case, oring=replace(ring, numerics=replace(ring.numerics, lines=lines)))
+        return case
+    numerics = case.oring.numerics
+    lines = replace(numerics, lines=other_lines(numerics.lines, factor))
+    return replace(case, oring=replace(case.oring, numerics=lines))
 
 
-def mesh_error(
-    case: LubricationCase, rows: Sequence[SteadyFriction], workers: Workers, work: Path | None = None
-) -> FloatArray:
-    """Change of each friction of ``rows`` on the next mesh, as of `MapRuns.mesh_error`; else as of `run_map`."""
-    levels = [row_parts(other_mesh(case, factor)) for factor in (0.5, 2.0)]
-    label, prepare = f'{case.name}: coarser and finer mesh', partial(compile_for_map, case)
-    outcomes = try_parts(label, [part for level in levels for part in level], workers, Kept(work), prepare)
-    errors = np.array(
-        [
-            np.full(len(row.friction), np.nan)
-            if outcome.error
-            else np.abs(np.asarray((outcome.result or {})['friction']) / row.friction - 1.0)
-            for outcome, row in zip(outcomes, [*rows, *rows], strict=True)
-        ]
-    )
-    coarser, finer = errors[: len(rows)], errors[len(rows) :]
-    return np.where(np.isnan(finer), coarser, finer)
+def table_part(case: LubricationCase) -> Part:
+    """The rows of a case, `rows_of` its result."""
+    return Part(part_key('table', asdict(case)), SteadyFriction._fields, partial(steady_table, case))
 
 
-def row_parts(case: LubricationCase) -> list[Part]:
-    """Part for each pressure of the grid of a case; its result is the `SteadyFriction`."""
-    settings, fields = asdict(case), SteadyFriction._fields
-    pressures = map_pressures(case.map).tolist()
-    return [Part(part_key(f'map {p!r}', settings), fields, partial(steady_friction, case, p)) for p in pressures]
+def steady_table(case: LubricationCase) -> dict[str, FloatArray]:
+    """`table_of` the `steady_rows` of a case."""
+    return table_of(steady_rows(case))
+
+
+def table_of(rows: Sequence[SteadyFriction]) -> dict[str, FloatArray]:
+    """Fields of rows, each over the pressures."""
+    return {
+        name: np.array(column) for name, column in zip(SteadyFriction._fields, zip(*rows, strict=True), strict=True)
+    }
+
+
+def rows_of(table: Values) -> list[SteadyFriction]:
+    """Rows of a `table_of` them."""
+    columns = [table[name] if table[name].ndim > 1 else table[name].tolist() for name in SteadyFriction._fields]
+    return [SteadyFriction(*row) for row in zip(*columns, strict=True)]
 
 
 def seal_document(computed: MapRuns, name: str) -> dict[str, Any]:

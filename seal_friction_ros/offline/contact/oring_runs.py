@@ -28,6 +28,7 @@ from seal_friction_ros.core.oring_contact.ring_friction import (
 )
 from seal_friction_ros.core.oring_contact.sealing_film import SealFilm, seal_film
 from seal_friction_ros.files import read_yaml
+from seal_friction_ros.offline.contact.mesh_levels import MeshLevels, mesh_levels
 from seal_friction_ros.offline.contact.section_files import with_files
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty as Spread
 from seal_friction_ros.offline.contact.uncertainty import check_unknown
@@ -35,6 +36,11 @@ from seal_friction_ros.offline.work.progress import progress
 from seal_friction_ros.offline.work.seal_writer import rounded, rounded_numbers
 
 DIGITS = 8  # of a computed number in a seal file
+ON_OTHER_MESHES = (
+    'normal_force_N', 'wall_force_N', 'peak_contact_stress_Pa', 'contact_width_m', 'area_deformation_gain',
+    'radial_force_N', 'friction_N', 'shear_stress_Pa', 'knee_stress_Pa', 'film_out_m', 'film_back_m',
+)  # fmt: skip
+"""Numbers of an `OringSummary` that are compared with those of other meshes; the leakage is a difference of two."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +90,7 @@ class Task(NamedTuple):
     """refuse a case without what `seal_document` needs, before computing; one without friction has `PRIOR`"""
     for_samples: bool = False  # refuse a case in which nothing is unknown, before computing
     fluid: tuple[float, float] | None = None  # viscosity [Pa s] and speed [m/s], for the film
+    meshes: bool = False  # compute the case on a coarser and a finer mesh, too
 
 
 class Computed(NamedTuple):
@@ -93,6 +100,11 @@ class Computed(NamedTuple):
     results: tuple[OringResult, ...]
     summary: OringSummary
     task: Task
+    mesh: MeshLevels | None = None  # None: computed on one mesh only
+
+    def numbers(self) -> dict[str, Any]:
+        """Numbers for JSON."""
+        return asdict(self.summary) | ({} if self.mesh is None else {'mesh': self.mesh.numbers()})
 
     @property
     def friction_law(self) -> FrictionLaw | None:
@@ -124,6 +136,8 @@ def compute_case(path: Path, task: Task | None = None) -> Computed:
 def compute_file(file: OringCaseFile, path: Path, task: Task | None = None) -> Computed:
     """Compute a parsed case, see `compute_case`; ``path`` names it in messages."""
     task = task or Task()
+    if task.meshes:
+        return _on_three_meshes(file, path, task)
     readings = task.readings
     with named_errors(path):
         wanted = tuple(task.pressures) or file.pressures
@@ -151,6 +165,23 @@ def compute_file(file: OringCaseFile, path: Path, task: Task | None = None) -> C
     deviations = () if fitted is None else tuple(fitted.deviations.tolist())
     films = films_of(file.case, results, task.fluid)
     return Computed(file, tuple(results), _summary(file, results, deviations, films), task)
+
+
+def _on_three_meshes(file: OringCaseFile, path: Path, task: Task) -> Computed:
+    """The case with the change of its numbers on other meshes, on each of which readings are fitted anew."""
+
+    def on_mesh(lines: int) -> Computed:
+        numerics = dataclasses.replace(file.case.numerics, lines=lines)
+        case = dataclasses.replace(file.case, numerics=numerics)
+        return compute_file(dataclasses.replace(file, case=case), path, task._replace(meshes=False))
+
+    def numbers(computed: Computed) -> dict[str, Any]:
+        return {name: getattr(computed.summary, name) for name in ON_OTHER_MESHES}
+
+    lines = file.case.numerics.lines
+    found = on_mesh(lines)
+    levels = mesh_levels(lines, found.summary.pressure_Pa, numbers(found), lambda count: numbers(on_mesh(count)))
+    return found._replace(task=task, mesh=levels)
 
 
 def _fitted(file: OringCaseFile, results: Sequence[OringResult], readings: Sequence[Reading]) -> FittedShear:
@@ -229,7 +260,8 @@ def seal_document(computed: Computed, spread: Spread | None = None) -> dict[str,
     found = friction.uncertainty.relative_std if spread is None else spread.relative_std
     pressures = [rounded(value, DIGITS) for value in computed.summary.pressure_Pa]
     readings = f' Shear law: {len(computed.task.readings)} readings of this ring.' if computed.task.readings else ''
-    source = f'{file.source} Contact: finite elements, {file.case.numerics.lines} lines.{readings}'
+    mesh = f' {computed.mesh.text}' if computed.mesh else ''
+    source = f'{file.source} Contact: finite elements, {file.case.numerics.lines} lines.{mesh}{readings}'
     speeds = [reading.speed for reading in computed.task.readings]
     return {
         'name': file.case.name,

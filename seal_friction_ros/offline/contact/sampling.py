@@ -26,14 +26,15 @@ from seal_friction_ros.core.oring_contact.oring_case import OringCase, check_pre
 from seal_friction_ros.core.oring_contact.oring_case_file import FRICTION_COEFFICIENT, varied_ring
 from seal_friction_ros.core.oring_contact.results import oring_results
 from seal_friction_ros.core.oring_contact.ring_friction import RingLaw, friction_of_contact
-from seal_friction_ros.offline.contact.lubrication_runs import compile_for_map, row_parts
+from seal_friction_ros.offline.contact.lubrication_runs import compile_for_map, table_part
+from seal_friction_ros.offline.contact.mesh_levels import COARSER, other_lines
 from seal_friction_ros.offline.contact.oring_runs import Computed, sliding_contact
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty, check_unknown
 from seal_friction_ros.offline.work.executor import Workers, nothing
 from seal_friction_ros.offline.work.finished_parts import Kept, Part, part_key, try_parts
 
 _EDGE = 1e-12  # share that is left out at both ends of a distribution, where a log-normal one has no value
-MOST_CELLS, MOST_LINES, MOST_SPEEDS, MOST_PRESSURES = 113, 17, 4, 3  # of a sample; docs/ehl.md says what it costs
+MOST_SPEEDS, MOST_PRESSURES = 4, 3  # of a sample; docs/ehl.md says what it costs
 
 
 def latin_hypercube(unknowns: Sequence[Unknown], samples: int, seed: int) -> FloatArray:
@@ -53,25 +54,24 @@ def uncertain_map(
     coarse = coarse_case(case)
 
     def parts_of(values: Mapping[str, float]) -> list[Part]:
-        return row_parts(varied_case(coarse, values))
+        return [table_part(varied_case(coarse, values))]
 
     outcome = sampled(f'{case.name}: samples', names, drawn, parts_of, workers, work, partial(compile_for_map, coarse))
-    tables = np.array([[row['friction'] for row in rows] for rows in outcome.computed])
+    tables = np.array([table['friction'] for (table,) in outcome.computed])
     pressures, speeds = tuple(map_pressures(coarse.map).tolist()), tuple(map_speeds(coarse.map).tolist())
     return Uncertainty(seed, names, drawn, outcome.failed, pressures, speeds, tables[0], tables[1:])
 
 
 def coarse_case(case: LubricationCase) -> LubricationCase:
-    """The case on the grid of its samples: fewer cells, speeds and pressures; the same ranges, and the same O-ring."""
-    numerics = replace(case.numerics, cells=min(case.numerics.cells, MOST_CELLS))
+    """The case on the grid of its samples: fewer speeds and pressures over the same ranges, on the same mesh."""
     grid = case.map
     grid = replace(grid, velocities=min(grid.velocities, MOST_SPEEDS), pressures=min(grid.pressures, MOST_PRESSURES))
-    return replace(case, numerics=numerics, map=grid)
+    return replace(case, map=grid)
 
 
 def coarse_ring(case: OringCase) -> OringCase:
-    """A ring with fewer grid lines."""
-    return replace(case, numerics=replace(case.numerics, lines=min(case.numerics.lines, MOST_LINES)))
+    """A ring on the next coarser mesh."""
+    return replace(case, numerics=replace(case.numerics, lines=other_lines(case.numerics.lines, COARSER)))
 
 
 class RingForces(NamedTuple):
@@ -100,7 +100,10 @@ class RingUncertainty(NamedTuple):
 def uncertain_ring(
     computed: Computed, samples: int, seed: int, workers: Workers, work: Path | None = None
 ) -> RingUncertainty:
-    """Forces of samples of an O-ring at the pressures that were computed, on a coarser grid; as `uncertain_map`."""
+    """Forces of samples of an O-ring at the pressures that were computed; as `uncertain_map`.
+
+    Samples are computed on the next coarser mesh; the force of the case on that mesh is their unit.
+    """
     file, pressures = computed.file, computed.summary.pressure_Pa
     case, law = coarse_ring(file.case), file.friction.law if file.friction else None
     names, drawn = _drawn(case.name, file.unknown, samples, seed)
@@ -114,6 +117,7 @@ def uncertain_ring(
 
     outcome = sampled(f'{case.name}: samples', names, drawn, parts_of, workers, work)
     forces = np.array([ring['normal_force'] for (ring,) in outcome.computed])
+    forces *= np.array(computed.summary.normal_force_N) / forces[0]
     factors = np.ones(len(forces))
     if FRICTION_COEFFICIENT in names:
         kept = np.delete(drawn, sorted(outcome.failed), axis=0)
@@ -122,6 +126,7 @@ def uncertain_ring(
     if law is None:
         return RingUncertainty(made(forces[0], forces[1:]), None)
     friction = factors[:, None] * np.array([ring['friction'] for (ring,) in outcome.computed])
+    friction *= np.array(computed.summary.friction_N) / friction[0]
     return RingUncertainty(made(forces[0], forces[1:]), made(friction[0], friction[1:]))
 
 

@@ -1,23 +1,14 @@
-"""A seal of any section: a shape or a drawing with its gland -> case, and how far its numbers depend on the mesh."""
+"""A seal of any section: a shape or a drawing with its gland -> case."""
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
-from seal_friction_ros.core.oring_contact.results import oring_results
-from seal_friction_ros.core.oring_contact.ring_friction import DISCRETISATION, PRIOR, friction_of_contact
 from seal_friction_ros.core.oring_contact.section import SHAPES, Section, section_of_shape
-from seal_friction_ros.offline.contact.oring_runs import Computed, films_of, sliding_contact
 from seal_friction_ros.offline.contact.section_files import SUFFIXES, read_outline
-from seal_friction_ros.offline.work.progress import progress
 
 _ROOM = 1.25  # default width of the groove over the length of the section (our choice)
-COARSER, FINER = 0.7, 1.4  # lines of the other two meshes over those of the case
 
 
 class Gland(NamedTuple):
@@ -30,22 +21,6 @@ class Gland(NamedTuple):
     clearance: float = 0.0
     height: float | None = None
     inner: float | None = None
-
-
-class MeshLevels(NamedTuple):
-    """Friction of one seal on three meshes."""
-
-    lines: tuple[int, ...]
-    friction_N: tuple[tuple[float, ...], ...]  # at each pressure, per mesh
-    error: float  # [-] largest difference to the finest mesh, of the one in the middle, which is in use
-    film_error: float | None = None  # [-] the same of the film; None: no film
-
-    def text(self) -> str:
-        """One line for a terminal."""
-        meshes = ', '.join(map(str, self.lines))
-        text = f'  meshes of {meshes} lines: friction within {100.0 * self.error:.2g} % of the finest'
-        text += '' if self.film_error is None else f', film within {100.0 * self.film_error:.2g} %'
-        return text if self.error <= DISCRETISATION else f'{text}: TOO MUCH, give more --lines'
 
 
 def section_document(
@@ -111,31 +86,3 @@ def case_of(document: Mapping[str, Any], pressures: Sequence[float], lines: int 
     """Parsed case of a document at ``pressures`` [Pa, gauge]. ValueError: see `parse_oring_case`."""
     numerics = {} if lines is None else {'numerics': {'lines': lines}}
     return parse_oring_case({**document, **numerics, 'pressures': list(pressures)})
-
-
-def mesh_levels(computed: Computed) -> MeshLevels:
-    """Friction of a computed case on its mesh, a coarser and a finer one.
-
-    NotConvergedError: a mesh has no equilibrium.
-    """
-    case, pressures = computed.file.case, computed.summary.pressure_Pa
-    law = (computed.file.friction or PRIOR).law
-    used = case.numerics.lines
-    lines = (max(9, round(COARSER * used)), used, min(129, round(FINER * used)))
-    found, films = [], []
-    with progress(f'{case.name}: meshes', len(lines)) as advance:
-        for count in lines:
-            numerics = dataclasses.replace(case.numerics, lines=count)
-            with named_errors(f'{count} lines'):
-                results = (
-                    computed.results
-                    if count == used
-                    else tuple(oring_results(dataclasses.replace(case, numerics=numerics), pressures))
-                )
-                found.append(tuple(friction_of_contact(law, sliding_contact(case, result)) for result in results))
-                films.append([film and film[:2] for film in films_of(case, results, computed.task.fluid)])
-            advance(1)
-    error = max(abs(coarse / fine - 1.0) for coarse, fine in zip(*found[1:], strict=True))
-    pairs = [pair for pair in zip(*films[1:], strict=True) if None not in pair]
-    film_error = float(np.abs(np.divide(*np.swapaxes(pairs, 0, 1)) - 1.0).max()) if pairs else None
-    return MeshLevels(lines, tuple(found), error, film_error)

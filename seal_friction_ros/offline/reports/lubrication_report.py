@@ -12,7 +12,8 @@ from seal_friction_ros.core.estimation.findings import LOOK, Verdict, percent
 from seal_friction_ros.core.foundation.arrays import BoolArray
 from seal_friction_ros.core.foundation.units import BAR, MM
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
-from seal_friction_ros.offline.contact.lubrication_runs import MARKED_MESH_ERROR, MapRuns
+from seal_friction_ros.core.oring_contact.ring_friction import DISCRETISATION
+from seal_friction_ros.offline.contact.lubrication_runs import MapRuns
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports.figure_style import Plot, house_style
@@ -26,7 +27,7 @@ from seal_friction_ros.offline.work.status import command_line
 def write_map_page(computed: MapRuns, out: Path) -> tuple[Path, ...]:
     """Write the page of a friction map; see `write_page`."""
     shape = len(computed.rows), len(computed.law.speeds)
-    errors = np.zeros(shape) if computed.mesh_error is None else np.nan_to_num(computed.mesh_error, nan=np.inf)
+    errors = np.zeros(shape) if computed.mesh_error is None else computed.mesh_error
     plots, spread = [map_figure(computed)], ''
     if computed.uncertainty is not None:
         plots.append(quantiles_figure(computed.uncertainty))
@@ -43,9 +44,9 @@ def write_map_page(computed: MapRuns, out: Path) -> tuple[Path, ...]:
         computed.case,
         verdict=Verdict(LOOK, text, after),
         law=computed.law,
-        map_table=_map_table(computed, errors > MARKED_MESH_ERROR),
+        map_table=_map_table(computed, errors > DISCRETISATION),
         map_notes=(computed.limits, computed.mesh),
-        is_marked=bool((errors > MARKED_MESH_ERROR).any()),
+        is_marked=bool((errors > DISCRETISATION).any()),
         **uncertainty_values(computed.uncertainty, computed.case.unknown),
     )
 

@@ -18,6 +18,7 @@ from seal_friction_ros.core.friction.geometry import projected_area, squeeze, st
 from seal_friction_ros.core.oring_contact.oring_case import gland_fill
 from seal_friction_ros.core.oring_contact.oring_case_file import MeasuredFriction
 from seal_friction_ros.core.oring_contact.results import OringResult, WallContact
+from seal_friction_ros.core.oring_contact.ring_friction import DISCRETISATION
 from seal_friction_ros.offline.contact.oring_runs import Computed, sliding_contact
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty
 from seal_friction_ros.offline.reports import figure_style as style
@@ -55,6 +56,8 @@ def numbers_text(computed: Computed) -> str:
         lines.append(_friction_text(computed, summary.friction_N))
     films = zip(summary.pressure_Pa, summary.film_out_m, summary.film_back_m, summary.leakage_m3_per_m, strict=False)
     lines += [_film_text(*film) for film in films]
+    if computed.mesh is not None:
+        lines.append(f'  {computed.mesh.text}')
     return '\n'.join(lines)
 
 
@@ -79,13 +82,8 @@ def _film_text(pressure: float, out: float | None, back: float | None, leakage: 
 
 
 @house_style()
-def write_oring_report(
-    computed: Computed, out: Path, uncertainty: Uncertainty | None = None, meshes: str = ''
-) -> tuple[Path, ...]:
-    """Write the report of a computed case, see `write_page`.
-
-    With the ``uncertainty`` of its force from samples, and what other ``meshes`` give in a line of text.
-    """
+def write_oring_report(computed: Computed, out: Path, uncertainty: Uncertainty | None = None) -> tuple[Path, ...]:
+    """Write the report of a computed case, with the ``uncertainty`` of its force from samples; see `write_page`."""
     case, readings = computed.file.case, len(computed.task.readings)
     measured = f'computed, readings: {readings}' if readings else 'computed, no measured data'
     return write_page(
@@ -94,7 +92,8 @@ def write_oring_report(
         oring_figures(computed),
         verdict=_verdict(computed),
         head=head_of(f'{"oring" if case.section is None else "section"} {case.name}', measured, case.name),
-        meshes=meshes,
+        mesh_text=computed.mesh.text if computed.mesh else '',
+        mesh_table=_mesh_table(computed),
         file=computed.file,
         case=case,
         summary=computed.summary,
@@ -128,6 +127,17 @@ def _verdict(computed: Computed) -> Verdict:
     return Verdict(level, text, 'measure a few readings and compare: the modulus decides.')
 
 
+_ON_OTHER_MESHES = {
+    'normal_force_N': 'normal force',
+    'wall_force_N': 'all wall stress',
+    'peak_contact_stress_Pa': 'peak contact stress',
+    'contact_width_m': 'contact width',
+    'friction_N': 'friction',
+    'film_out_m': 'film out',
+    'film_back_m': 'film back',
+}
+
+
 # -- tables -----------------------------------------------------------------------------------------------------------
 
 
@@ -155,6 +165,23 @@ def _number_table(computed: Computed) -> Table:
         ('Newton steps', lambda one: one.newton_steps),
     )
     return table_of(computed.results, columns)
+
+
+def _mesh_table(computed: Computed) -> Table:
+    """Change of the numbers on other meshes, marked where it is large; no rows for one mesh."""
+    if computed.mesh is None:
+        return Table((), [])
+    changes = computed.mesh.change
+    heads = {name: text for name, text in _ON_OTHER_MESHES.items() if name in changes}
+    rows = [
+        (number(pressure, unit=BAR), *(_changed(changes[name][i]) for name in heads))
+        for i, pressure in enumerate(computed.summary.pressure_Pa)
+    ]
+    return Table(('pressure [bar]', *(f'{text} [%]' for text in heads.values())), rows)
+
+
+def _changed(change: float) -> str:
+    return number(change, 2, unit=0.01) + (' *' if change > DISCRETISATION else '')
 
 
 def _thesis_table(computed: Computed) -> Table:

@@ -12,8 +12,10 @@ from scipy.integrate import trapezoid
 
 from seal_friction_ros.core.lubrication import oring_film as module
 from seal_friction_ros.core.lubrication.contact import asperity_pressure
+from seal_friction_ros.core.lubrication.friction_map import steady_state
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
-from seal_friction_ros.core.lubrication.oring_film import OringFilm, oring_film
+from seal_friction_ros.core.lubrication.model import fluid_force, solid_limit
+from seal_friction_ros.core.lubrication.oring_film import FILM_CROWDING, OringFilm, flat_part, oring_film
 from seal_friction_ros.core.lubrication.seal_profile import LubricationNumerics
 from seal_friction_ros.core.lubrication.topography import Topography
 from seal_friction_ros.core.oring_contact.compliance import SlidingFace, sliding_face
@@ -50,7 +52,7 @@ class Sealed(NamedTuple):
 @pytest.fixture(scope='module', params=['rod', 'bore'])
 def sealed(request) -> Sealed:
     ring = ring_on(request.param)
-    elements = oring_model(ring)
+    elements = oring_model(ring, FILM_CROWDING)
     loaded = next(loaded_states(ring, elements, (PRESSURE,)))
     face = sliding_face(elements, loaded, ROD if request.param == 'rod' else GLAND)
     found = evaluate_contact(elements, loaded)
@@ -71,16 +73,33 @@ def test_film_reaches_no_farther_than_the_face_of_the_ring(sealed, monkeypatch):
     monkeypatch.setattr(module, '_MARGIN', 5.0)
     model = oring_film(case_of(sealed.ring), sealed.ring, PRESSURE).model
     half = 0.5 * model.contact.body.cell_width
-    assert (model.place[0] - half, model.place[-1] + half) == pytest.approx(tuple(sealed.face.place[[0, -1]]))
+    flat = flat_part(sealed.face)
+    assert (model.place[0] - half, model.place[-1] + half) == pytest.approx(tuple(flat.place[[0, -1]]))
+    assert np.abs(np.diff(flat.gap) / np.diff(flat.place)).max() <= 1.0  # 45 degrees
 
 
-@pytest.mark.long
-def test_the_gap_of_a_fine_mesh_opens_up_to_the_wall_of_the_groove_where_the_face_turns_away():
-    """There the gap rises by 50 um from one node to the next."""
-    ring = dataclasses.replace(ring_on('rod'), numerics=OringNumerics(lines=65))
+@pytest.mark.parametrize('lines', [17, pytest.param(65, marks=pytest.mark.long)])
+def test_under_a_high_pressure_the_film_ends_outside_the_contact_where_the_face_turns_to_the_groove(lines):
+    """At 69 bar the wall of the groove is next to the contact; the gap opens there by 100 um within 60 um."""
+    ring = dataclasses.replace(ring_on('rod'), numerics=OringNumerics(lines=lines))
     film = oring_film(case_of(ring), ring, 6.9e6)
+    solid, _ = asperity_pressure(film.start.gap, film.model.contact.asperities)
     assert film.start.gap.min() > 0.0
-    assert (np.diff(film.start.gap[-10:]) > 0.0).all()
+    assert film.start.gap[-1] > 3e-6
+    assert solid[-1] < 1e-3 * solid.max()
+
+
+def test_friction_at_high_speed_is_the_same_on_another_mesh_within_2_percent():
+    """The film begins in the inlet, where a gap between the nodes decides."""
+
+    def friction(lines: int) -> float:
+        ring = dataclasses.replace(ring_on('rod'), numerics=OringNumerics(lines=lines))
+        case = dataclasses.replace(case_of(ring), numerics=LubricationNumerics(cells=226))
+        model, start, _ = oring_film(case, ring, 0.0)
+        state, _ = steady_state(model, start, 0.1)
+        return solid_limit(model, state) + fluid_force(model, state, 0.1)
+
+    assert friction(17) == pytest.approx(friction(25), rel=0.02)
 
 
 def test_film_goes_round_the_wall_that_slides_and_has_the_rubber_in_plane_strain(sealed):
@@ -104,10 +123,7 @@ def test_fluid_stands_up_to_the_peak_of_the_contact_and_nothing_beyond_it(sealed
 
 
 def test_ring_at_rest_is_in_balance_with_fluid_and_asperities(sealed):
-    """It is h = g + K (p + p_c); both carry what the dry ring carried, and beside the contact the gap is still its own.
-
-    The face is convex there, so the gap is less than a straight line between two of its nodes.
-    """
+    """It is h = g + K (p + p_c); both carry what the dry ring carried; beside the contact the gap is still its own."""
     model, (gap, fluid, _) = sealed.film.model, sealed.film.start
     solid, _ = asperity_pressure(gap, model.contact.asperities)
     assert gap == pytest.approx(model.profile + model.contact.body.deflection(fluid + solid), abs=1e-12)
@@ -116,5 +132,4 @@ def test_ring_at_rest_is_in_balance_with_fluid_and_asperities(sealed):
     carried = trapezoid(np.interp(within, face.place, face.pressure), within)
     assert (fluid + solid).sum() * model.contact.body.cell_width == pytest.approx(carried, rel=0.05)
     dry_gap = np.interp(place[[0, -1]], face.place, face.gap)
-    assert (gap[[0, -1]] < dry_gap).all()
-    assert gap[[0, -1]] == pytest.approx(dry_gap, rel=0.3)
+    assert gap[[0, -1]] == pytest.approx(dry_gap, rel=0.1)

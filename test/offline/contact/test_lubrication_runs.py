@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from harness.ehl_cases import COARSE_RING, answer, measured_bag
 
+from seal_friction_ros.core.foundation.errors import NotConvergedError
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
-from seal_friction_ros.core.lubrication.friction_map import steady_friction
+from seal_friction_ros.core.lubrication.friction_map import SteadyFriction
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, MapGrid
 from seal_friction_ros.core.lubrication.seal_profile import LubricationNumerics
 from seal_friction_ros.core.messages.records import Status
@@ -16,7 +17,6 @@ from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.bags.recorded_run import read_run
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.contact import lubrication_runs as runs
-from seal_friction_ros.offline.work.finished_parts import Part
 
 
 def test_map_becomes_a_seal_file_that_the_estimator_takes(small, tmp_path, capsys):
@@ -33,27 +33,27 @@ def test_map_becomes_a_seal_file_that_the_estimator_takes(small, tmp_path, capsy
 
 
 def test_the_error_of_a_map_is_its_change_on_the_next_finer_mesh_or_on_the_coarser_one(monkeypatch):
-    grid = MapGrid(velocity_min=1e-2, velocity_max=0.1, velocities=2, pressures=2)
+    grid = MapGrid(velocity_min=1e-2, velocity_max=0.1, velocities=2, pressure_max=1e5, pressures=2)
     case = LubricationCase(name='seal', numerics=LubricationNumerics(cells=48), map=grid)
-    row = steady_friction(case, 0.0)
 
-    def rows(other):
-        """Of the coarser mesh 10 % more, of the finer one 2 % less, which fails in the second row."""
-        if other.numerics.cells < case.numerics.cells:
-            return [Part(f'c{i}', ('friction',), partial(dict, friction=1.1 * row.friction)) for i in range(2)]
-        finer = partial(dict, friction=0.98 * row.friction)
-        return [Part('f0', ('friction',), finer), Part('f1', ('friction',), partial(int, 'fails'))]
+    def table(other, finer_fails=False):
+        """On the coarser mesh 10 % more, on the finer one 8 % less, if that can be computed."""
+        factor = {34: 1.1, 48: 1.0, 67: 0.92}[other.numerics.cells]
+        if finer_fails and factor < 1.0:
+            raise NotConvergedError('told to')
+        rows = [SteadyFriction(p, np.array([2.0, 1.0]), np.ones(2), np.zeros(2), 1e5, 0) for p in (0.0, 1e5)]
+        return runs.table_of([row._replace(friction=factor * row.friction) for row in rows])
 
-    monkeypatch.setattr(runs, 'row_parts', rows)
-    found = runs.mesh_error(case, [row, row], 1)
-    assert found[0] == pytest.approx(0.02)
-    assert found[1] == pytest.approx(0.1)
+    monkeypatch.setattr(runs, 'steady_table', table)
+    assert runs.run_map(case, 1).mesh_error == pytest.approx(np.full((2, 2), 0.08))
+    monkeypatch.setattr(runs, 'steady_table', partial(table, finer_fails=True))
+    assert runs.run_map(case, 1).mesh_error == pytest.approx(np.full((2, 2), 0.1))
 
 
-def test_the_meshes_of_a_ring_are_17_33_and_65_lines_and_those_of_another_seal_halve_its_cells():
-    ring, profile = runs.load_case('oring_delft'), LubricationCase(name='seal')
-    assert [runs.other_mesh(ring, factor).oring.numerics.lines for factor in (0.5, 2.0)] == [17, 65]
-    assert [runs.other_mesh(profile, factor).numerics.cells for factor in (0.5, 2.0)] == [113, 452]
+def test_the_other_meshes_of_a_ring_have_other_elements_and_cells():
+    ring = runs.load_case('oring_delft')
+    others = [runs.other_mesh(ring, factor) for factor in (0.7, 1.4)]
+    assert [(other.oring.numerics.lines, other.numerics.cells) for other in others] == [(23, 448), (46, 896)]
 
 
 def test_recording_with_a_mapped_seal_replays_to_the_same_bytes_and_rubs_less_the_faster_it_slides(small, tmp_path):

@@ -68,11 +68,15 @@ def test_json_has_one_number_for_every_pressure(tmp_path: Path, capsys: pytest.C
     assert figures['normal_force_N'] == sorted(figures['normal_force_N'])
     area = projected_area(parse_oring_case(document()).case.geometry)
     assert figures['axial_force_N'][1] == pytest.approx(5e5 * area, rel=0.01)
+    assert figures['mesh']['lines'] == [9, 13, 18]
+    assert all(0.0 < change < 0.1 for change in figures['mesh']['change']['friction_N'])
+    assert any('wall_force_N by' in marked for marked in figures['mesh']['marked'])  # 13 lines are few
 
 
 def test_the_seal_file_made_is_a_seal_with_the_computed_normal_force(computed: Path):
     text = (computed / 'seal.yaml').read_text()
     seal = parse_seal(yaml.safe_load(text))
+    assert 'Mesh: 13 lines; 9 or 18 change by MORE THAN 3 %' in yaml.safe_load(text)['source']
     table = yaml.safe_load(text)['normal_force']
     assert table['law'] == 'monotone_table'
     force = table['normal_forces'][0]

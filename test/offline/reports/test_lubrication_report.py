@@ -60,8 +60,8 @@ def test_a_map_says_where_no_lubricant_gets_under_the_seal_and_where_the_flow_fa
 
 
 def test_a_map_marks_what_the_mesh_changes_by_more_than_3_percent_and_warns_above_5(tmp_path):
-    errors = np.array([[0.001, 0.02, 0.031], [np.nan, 0.012, 0.14]])
-    computed = computed_map()._replace(mesh_error=np.nan_to_num(errors, nan=0.0))
+    errors = np.array([[0.001, 0.02, 0.031], [np.inf, 0.012, 0.14]])
+    computed = computed_map()._replace(mesh_error=np.where(np.isinf(errors), 0.0, errors))
     report.write_map_page(computed, tmp_path / 'map.html')
     page = checked_page(tmp_path / 'map.html')
     assert [list(row.values())[1:] for row in page.table('speed [mm/s]')[:3]] == [
@@ -71,12 +71,13 @@ def test_a_map_marks_what_the_mesh_changes_by_more_than_3_percent_and_warns_abov
     ]
     assert (
         'Mesh: the next one changes the friction by 14 % at most, at 100 mm/s and 1 bar, and by 2 % at most at 10 '
-        'mm/s; above 5 % a number is not converged.'
+        'mm/s; 2 of 6 by MORE THAN 3 %, at 100 to 100 mm/s; above 5 % a number is not converged.'
     ) in page.texts['p.note']
     assert 'not converged' not in computed._replace(mesh_error=np.full((2, 3), 0.049)).mesh
     unknown = computed._replace(mesh_error=errors)
     assert 'neither the finer nor the coarser one can be computed at 1 mm/s and 1 bar' in unknown.mesh
-    assert unknown.numbers()['mesh_error'][1] == [None, 0.012, 0.14]
+    assert unknown.numbers()['mesh_error'][1] == [np.inf, 0.012, 0.14]
+    assert unknown.numbers()['mesh_marked'] == [[False, False, True], [True, False, True]]
 
 
 def test_a_map_with_samples_shows_what_is_unknown_its_quantiles_and_what_failed(tmp_path):

@@ -7,6 +7,7 @@ from harness.report_page import checked_page
 from paths import ROOT
 
 from seal_friction_ros.offline.commands.main import main
+from seal_friction_ros.offline.contact.mesh_levels import MeshLevels
 from seal_friction_ros.offline.contact.oring_runs import compute_case
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty
 from seal_friction_ros.offline.reports.formatting import number
@@ -46,6 +47,15 @@ def test_the_page_stands_alone_and_shows_the_numbers_and_the_thesis(computed, tm
     first = (tmp_path / 'page.html').read_bytes()
     write_oring_report(computed, tmp_path / 'page.html')
     assert (tmp_path / 'page.html').read_bytes() == first
+
+
+def test_the_page_marks_what_a_finer_mesh_changes_by_more_than_3_percent(computed, tmp_path):
+    levels = MeshLevels((9, 13, 18), {'normal_force_N': (0.01, 0.034), 'gain': (0.2,)}, computed.summary.pressure_Pa)
+    write_oring_report(computed._replace(mesh=levels), tmp_path / 'page.html')
+    page = checked_page(tmp_path / 'page.html')
+    (table,) = (table for table in page.tables if 'normal force [%]' in table[0])
+    assert [row[1] for row in table[1:]] == ['1.00', '3.40 *']
+    assert any('normal_force_N by 3.4 % at 17.2 bar, gain by 20 %' in text for text in page.texts['p'])
 
 
 def test_a_case_of_one_pressure_without_friction_still_makes_a_page_and_its_name_is_escaped(tmp_path):
