@@ -54,7 +54,7 @@ def oring_film(case: LubricationCase, oring: OringCase, pressure: float) -> Orin
     cells = case.numerics.cells
     place = begin + (np.arange(cells) + 0.5) * (end - begin) / cells
     circumference = math.pi * (geometry.rod_diameter if on_rod else geometry.gland_diameter)
-    modulus = 4.0 / 3.0 * oring.rubber.elastic_modulus  # E / (1 - 1/4)
+    modulus = 4.0 / 3.0 * oring.rubber.modulus  # E / (1 - 1/4)
     body = condensed_body(place, face.place, face.compliance, modulus, circumference)
     dry_gap: FloatArray = _gap(face, place)
     dry_pressure: FloatArray = PchipInterpolator(face.place, face.pressure)(place)

@@ -143,7 +143,7 @@ def seat_ring(case: OringCase, model: OringModel, free: Assembly, squeezed: Load
     top = float(outline(model, squeezed.state)[:, 1].max())
     wall = squeezed.surroundings._replace(
         wall_position=top - seating * case.geometry.section_diameter,
-        transition=case.numerics.transition * case.rubber.elastic_modulus,
+        transition=case.numerics.transition * case.rubber.modulus,
     )
     with _named(case, 'of the ring on the downstream wall'):
         state, steps = solve_equilibrium(model, make_assembly(model, _fixed(model)), wall, squeezed.state)
@@ -241,7 +241,7 @@ def _check_unfolded(case: OringCase, model: OringModel, now: LoadedRing) -> None
 
 def _dry_walls(case: OringCase, model: OringModel) -> Surroundings:
     """Rod and gland at their final radii, no fluid, no downstream wall."""
-    geometry, elastic_modulus = case.geometry, case.rubber.elastic_modulus
+    geometry, elastic_modulus = case.geometry, case.rubber.modulus
     return Surroundings(
         rod_radius=geometry.rod_diameter / 2.0,
         gland_radius=geometry.gland_diameter / 2.0,

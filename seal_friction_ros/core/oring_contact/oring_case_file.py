@@ -7,7 +7,7 @@ Example; docs/oring.md describes every field::
     geometry: {section_diameter: 2.62e-3, ring_inner_diameter: 15.54e-3, rod_diameter: ..., gland_diameter: ...}
     section: {shape: x_ring}            # optional: round without it; or outline: [[r, z], ...] [m]
     groove: {width: 3.6e-3, diametral_clearance: 0.1e-3}
-    rubber: {hardness: 70.0}            # or elastic_modulus [Pa]; mooney_ratio, bulk_modulus
+    rubber: {hardness: 70.0}            # or elastic_modulus [Pa], or ogden_moduli; see `Rubber`
     pressures: [0.0, 3.4e+6, 6.9e+6]    # [Pa, gauge]
     friction:                           # optional: without it --reading or a prior
       contact_shear: {shear_stress: 0.1e6, knee_stress: 0.26e6}   # or friction_coefficient, as in a seal file
@@ -39,7 +39,7 @@ from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws.contact_shear import ShearLaw
 from seal_friction_ros.core.friction.laws.friction_coefficient import FrictionCoefficientLaw
 from seal_friction_ros.core.friction.seal_file import check_no_exponent, parse_part
-from seal_friction_ros.core.oring_contact.material import Rubber, elastic_modulus_of_hardness
+from seal_friction_ros.core.oring_contact.material import Rubber, elastic_modulus_of_hardness, modulus_of_ogden
 from seal_friction_ros.core.oring_contact.oring_case import Groove, OringCase, OringNumerics, check_pressures
 from seal_friction_ros.core.oring_contact.ring_friction import RingLaw, SealFriction
 from seal_friction_ros.core.oring_contact.section import Section, checked_outline, mirrored, section_of_shape
@@ -106,7 +106,7 @@ def parse_oring_case(document: Any) -> OringCaseFile:
     check_names(document, _KEYS, where)
     rubber = _rubber(document.get('rubber'), f'{where}: rubber')
     geometry = from_mapping(
-        SealGeometry, document.get('geometry'), f'{where}: geometry', elastic_modulus=rubber.elastic_modulus
+        SealGeometry, document.get('geometry'), f'{where}: geometry', elastic_modulus=rubber.modulus
     )
     section = _section(document['section'], f'{where}: section') if 'section' in document else None
     standard = {} if section is None else {'transition': SECTION_TRANSITION}
@@ -159,13 +159,17 @@ def _cap(values: Any, section: Section | None, where: str) -> Rubber | None:
 
 def _rubber(values: Any, where: str) -> Rubber:
     """Rubber from either its modulus or its hardness."""
-    if not isinstance(values, Mapping) or ('hardness' in values) == ('elastic_modulus' in values):
+    given = {'hardness', 'elastic_modulus'} & set(values) if isinstance(values, Mapping) else set()
+    if not isinstance(values, Mapping) or len(given) != 1 - ('ogden_moduli' in values and not given):
         raise ValueError(f'{where}: give one of hardness [Shore A] and elastic_modulus [Pa]; got {values!r}')
     others = {key: value for key, value in values.items() if key != 'hardness'}
     if 'hardness' in values:
         hardness = from_mapping(_Hardness, {'hardness': values['hardness']}, where).hardness
         with named_errors(where):
             others['elastic_modulus'] = elastic_modulus_of_hardness(hardness)
+    elif not given:
+        found = from_mapping(Rubber, {**others, 'elastic_modulus': 1e6}, where)
+        others['elastic_modulus'] = modulus_of_ogden(found.ogden_moduli, found.ogden_exponents)
     return from_mapping(Rubber, others, where)
 
 
@@ -231,9 +235,10 @@ def varied_ring(case: OringCase, values: Mapping[str, float]) -> OringCase:
             parts.setdefault(part, {})[field] = value
         elif name != FRICTION_COEFFICIENT:  # a factor on what is computed with the case
             others[name] = value
-    if 'elastic_modulus' in (rubber := parts.get('rubber', {})):
-        parts.setdefault('geometry', {})['elastic_modulus'] = rubber['elastic_modulus']
-    return replace(case, **{part: replace(getattr(case, part), **changed) for part, changed in parts.items()}, **others)
+    changed = {part: replace(getattr(case, part), **fields) for part, fields in parts.items()}
+    if 'rubber' in changed:
+        changed['geometry'] = replace(changed.get('geometry', case.geometry), elastic_modulus=changed['rubber'].modulus)
+    return replace(case, **changed, **others)
 
 
 def _unknown(document: Mapping[str, Any], case: OringCase, has_friction: bool, where: str) -> tuple[Unknown, ...]:

@@ -51,7 +51,7 @@ _OPTIONS: dict[str, tuple[str, cli.Settings]] = {
     '--pressure': ('gauge, in Pa or with a unit', {'type': _pressure, 'nargs': '+', 'required': True, 'metavar': 'P'}),
     '--hardness': ('of the rubber, Shore A, default 70', {'type': float, 'default': 70.0, 'metavar': 'A'}),
     '--test': ('tension test of the rubber: CSV (strain [1], stress [MPa])', {'type': Path, 'metavar': 'FILE'}),
-    '--model': ('of the rubber of --test, default yeoh', {'choices': ('mooney', 'yeoh'), 'default': 'yeoh'}),
+    '--model': ('of the rubber of --test, default yeoh', {'choices': ('mooney', 'yeoh', 'ogden'), 'default': 'yeoh'}),
     '--lines': ('of the mesh, as numerics.lines of a case', {'type': cli.at_least(13), 'metavar': 'N'}),
     '--name': ('of the seal; default: of the drawing', {'default': ''}),
 }

@@ -171,7 +171,7 @@ def films_of(
     if fluid is None:
         return ()
     face = case.cap or case.rubber
-    elasticity = 4.0 / 3.0 * face.elastic_modulus, case.numerics.transition * case.rubber.elastic_modulus
+    elasticity = 4.0 / 3.0 * face.modulus, case.numerics.transition * case.rubber.modulus
     return tuple(seal_film(sliding_contact(case, one), one.pressure, elasticity, fluid) for one in results)
 
 
@@ -193,7 +193,7 @@ def _summary(
         pressure_Pa=tuple(result.pressure for result in results),
         normal_force_N=normal,
         wall_force_N=tuple(contact.wall_force for contact in contacts),
-        stretch_force_N=stretch_force(dataclasses.replace(geometry, elastic_modulus=file.case.rubber.elastic_modulus)),
+        stretch_force_N=stretch_force(dataclasses.replace(geometry, elastic_modulus=file.case.rubber.modulus)),
         axial_force_N=axial,
         peak_contact_stress_Pa=tuple(contact.peak_stress for contact in contacts),
         contact_width_m=tuple(contact.width for contact in contacts),
