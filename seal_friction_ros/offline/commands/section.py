@@ -15,7 +15,7 @@ def add_parser(commands: Any) -> None:
         'section x_ring --height 3.53mm --rod 19.346mm --gland 25.7mm --sliding bore --pressure 7bar',
         'section my_seal.dxf --rod 36mm --gland 46mm --pressure 50bar --reading 50bar,0.1,40N --out seal.yaml',
     )  # fmt: skip
-    text = 'x_ring, u_cup, capped_ring, circle, or the outline in a file: CSV (r [mm], z [mm]) or DXF'
+    text = 'x_ring, u_cup, lip_seal, wiper, capped_ring, circle, or the outline in a file: CSV (r [mm], z [mm]) or DXF'
     parser.add_argument('drawing', metavar='SHAPE|FILE', help=text)
     cli.add_options(parser, _OPTIONS)
     parser.add_argument('--mirrored', action='store_true', help='turn the inside of the section out')
@@ -48,6 +48,9 @@ _OPTIONS: dict[str, tuple[str, cli.Settings]] = {
     '--inner': _diameter('free inner diameter of the seal; default: as drawn, or in the middle of the gap'),
     '--groove': _diameter('width of the groove; default: 1.25 times the length of the section'),
     '--clearance': _diameter('diametral clearance behind the seal, default 0', default=0.0),
+    '--corner-radius': _diameter(
+        'radius of the corners that face the sliding wall; default: 2 % of the height, of a drawing as drawn'
+    ),
     '--pressure': ('gauge, in Pa or with a unit', {'type': _pressure, 'nargs': '+', 'required': True, 'metavar': 'P'}),
     '--hardness': ('of the rubber, Shore A, default 70', {'type': float, 'default': 70.0, 'metavar': 'A'}),
     '--test': ('tension test of the rubber: CSV (strain [1], stress [MPa])', {'type': Path, 'metavar': 'FILE'}),

@@ -1,7 +1,7 @@
 """A seal of any section: a shape or a drawing with its gland -> case, and how far its numbers depend on the mesh."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,6 +17,7 @@ from seal_friction_ros.offline.contact.section_files import SUFFIXES, read_outli
 from seal_friction_ros.offline.work.progress import progress
 
 _ROOM = 1.25  # default width of the groove over the length of the section (our choice)
+_COMPARED = {'force': 'normal force', 'peak_stress': 'peak stress', 'width': 'contact width'}
 COARSER, FINER = 0.7, 1.4  # lines of the other two meshes over those of the case
 
 
@@ -30,6 +31,7 @@ class Gland(NamedTuple):
     clearance: float = 0.0
     height: float | None = None
     inner: float | None = None
+    corner_radius: float | None = None  # of the section where it faces the sliding wall; None: as drawn
 
 
 class MeshLevels(NamedTuple):
@@ -38,13 +40,17 @@ class MeshLevels(NamedTuple):
     lines: tuple[int, ...]
     friction_N: tuple[tuple[float, ...], ...]  # at each pressure, per mesh
     error: float  # [-] largest difference to the finest mesh, of the one in the middle, which is in use
-    film_error: float | None = None  # [-] the same of the film; None: no film
+    film_error: float | None = None  # [-] the same of the film; None: no film on two meshes
+    films_on_one_mesh: int = 0  # pressures at which there is a film on the mesh in use and none on the finest
+    contact_errors: Mapping[str, float] = {}  # [-] the same of each of `_COMPARED`
 
     def text(self) -> str:
         """One line for a terminal."""
         meshes = ', '.join(map(str, self.lines))
         text = f'  meshes of {meshes} lines: friction within {100.0 * self.error:.2g} % of the finest'
         text += '' if self.film_error is None else f', film within {100.0 * self.film_error:.2g} %'
+        text += f', film of ONE MESH at {self.films_on_one_mesh} pressures' if self.films_on_one_mesh else ''
+        text += ''.join(f', {name} within {100.0 * error:.2g} %' for name, error in self.contact_errors.items())
         return text if self.error <= DISCRETISATION else f'{text}: TOO MUCH, give more --lines'
 
 
@@ -82,7 +88,11 @@ def section_document(
             'gland_diameter': gland.gland,
             'sliding_wall': gland.sliding,
         },
-        'section': {**part, **({'mirrored': True} if mirrored else {})},
+        'section': {
+            **part,
+            **({'mirrored': True} if mirrored else {}),
+            **({} if gland.corner_radius is None else {'corner_radius': gland.corner_radius}),
+        },
         'groove': {
             'width': _ROOM * length if gland.groove is None else gland.groove,
             'diametral_clearance': gland.clearance,
@@ -122,7 +132,7 @@ def mesh_levels(computed: Computed) -> MeshLevels:
     law = (computed.file.friction or PRIOR).law
     used = case.numerics.lines
     lines = (max(9, round(COARSER * used)), used, min(129, round(FINER * used)))
-    found, films = [], []
+    found, films, contacts = [], [], []
     with progress(f'{case.name}: meshes', len(lines)) as advance:
         for count in lines:
             numerics = dataclasses.replace(case.numerics, lines=count)
@@ -132,10 +142,19 @@ def mesh_levels(computed: Computed) -> MeshLevels:
                     if count == used
                     else tuple(oring_results(dataclasses.replace(case, numerics=numerics), pressures))
                 )
-                found.append(tuple(friction_of_contact(law, sliding_contact(case, result)) for result in results))
+                contacts.append([sliding_contact(case, result) for result in results])
+                found.append(tuple(friction_of_contact(law, contact) for contact in contacts[-1]))
                 films.append([film and film[:2] for film in films_of(case, results, computed.task.fluid)])
             advance(1)
-    error = max(abs(coarse / fine - 1.0) for coarse, fine in zip(*found[1:], strict=True))
+
+    def largest(pairs: Iterable[tuple[float, float]]) -> float:
+        return max(abs(coarse / fine - 1.0) for coarse, fine in pairs)
+
+    errors = {
+        name: largest((getattr(one, key), getattr(fine, key)) for one, fine in zip(*contacts[1:], strict=True))
+        for key, name in _COMPARED.items()
+    }
     pairs = [pair for pair in zip(*films[1:], strict=True) if None not in pair]
-    film_error = float(np.abs(np.divide(*np.swapaxes(pairs, 0, 1)) - 1.0).max()) if pairs else None
-    return MeshLevels(lines, tuple(found), error, film_error)
+    film_error = largest(zip(*map(np.ravel, np.swapaxes(pairs, 0, 1)), strict=True)) if pairs else None
+    alone = sum(one is not None and finest is None for one, finest in zip(*films[1:], strict=True))
+    return MeshLevels(lines, tuple(found), largest(zip(*found[1:], strict=True)), film_error, alone, errors)
