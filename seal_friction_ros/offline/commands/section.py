@@ -49,7 +49,7 @@ _OPTIONS: dict[str, tuple[str, cli.Settings]] = {
     '--groove': _diameter('width of the groove; default: 1.25 times the length of the section'),
     '--clearance': _diameter('diametral clearance behind the seal, default 0', default=0.0),
     '--corner-radius': _diameter(
-        'radius of the corners that face the sliding wall; default: 2 % of the height, of a drawing as drawn'
+        'radius of the corners that face the sliding wall; default: 2 %% of the height, of a drawing as drawn'
     ),
     '--pressure': ('gauge, in Pa or with a unit', {'type': _pressure, 'nargs': '+', 'required': True, 'metavar': 'P'}),
     '--hardness': ('of the rubber, Shore A, default 70', {'type': float, 'default': 70.0, 'metavar': 'A'}),
