@@ -34,6 +34,11 @@ OTHERS: list[dict[str, Any]] = [
      'bar': (0, 50, 100, 150)}
     for rod in (36, 50)
 ] + [
+    {'name': 'lip_seal_36_rod', 'what': 'Asymmetric lip seal of nitrile, Shore A 85', 'rod': 36.0, 'gland': 46.0,
+     'height': 5.7, 'groove': 10.0, 'section': {'shape': 'lip_seal'}, 'sliding': 'rod', 'hardness': 85.0,
+     'bar': (0, 20, 50)},
+    {'name': 'wiper_36_rod', 'what': 'Wiper of polyurethane, Shore A 93', 'rod': 36.0, 'gland': 46.0, 'height': 5.5,
+     'groove': 8.0, 'section': {'shape': 'wiper'}, 'sliding': 'rod', 'hardness': 93.0, 'bar': (0,)},
     {'name': 'capped_ring_50_bore', 'what': 'PTFE cap on a ring of nitrile, Shore A 70', 'rod': 39.0, 'gland': 50.0,
      'height': 5.9, 'groove': 7.5, 'section': {'shape': 'capped_ring', 'mirrored': True}, 'sliding': 'bore',
      'hardness': 70.0, 'bar': (0, 50, 100)},

@@ -23,7 +23,7 @@ from seal_friction_ros.core.foundation.parameters import (
 )
 from seal_friction_ros.core.lubrication.elasticity import ElasticBody
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, PressureSqueeze, no_oring, parse_case
-from seal_friction_ros.core.lubrication.seal_profile import LubricationNumerics, SealBody
+from seal_friction_ros.core.lubrication.seal_profile import BODIES, LubricationNumerics, SealBody
 from seal_friction_ros.core.oring_contact.oring_case_file import OringCaseFile
 from seal_friction_studies.core.bonded_layer import BondedLayer
 from seal_friction_studies.core.groove import GrooveSpring
@@ -35,11 +35,10 @@ from seal_friction_studies.core.wall import ControlEdge, FilmSupply
 class StudySeal(SealBody):
     """Seal whose body may also be a layer bonded to a rigid base."""
 
-    BODIES: ClassVar[tuple[str, ...]] = (*SealBody.BODIES, 'bonded_layer')
-
     body: str = parameter(
         'half_plane',
         unit='',
+        choices=(*BODIES, 'bonded_layer'),
         description='half_plane: held at the section height. bonded_layer: incompressible, that high, on a rigid base. '
         'finite_elements: a crowned section.',
     )

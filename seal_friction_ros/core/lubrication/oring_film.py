@@ -72,7 +72,7 @@ def _film(case: LubricationCase, oring: OringCase, elements: OringModel, loaded:
     cells = case.numerics.cells
     place = begin + (np.arange(cells) + 0.5) * (end - begin) / cells
     circumference = math.pi * (geometry.rod_diameter if on_rod else geometry.gland_diameter)
-    modulus = 4.0 / 3.0 * oring.rubber.elastic_modulus  # E / (1 - 1/4)
+    modulus = 4.0 / 3.0 * oring.rubber.modulus  # E / (1 - 1/4)
     body = condensed_body(place, face.place, face.compliance, modulus, circumference)
     at_ends = np.interp((begin, end), face.place, face.pressure)
     inside = (face.place >= begin) & (face.place <= end)

@@ -1,14 +1,13 @@
 """A seal that is no O-ring: its profile, what it is made of, and the grid along it."""
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 
-HOLDS = ('bottom', 'bottom_and_flanks', 'sliding_bottom')
+BODIES = ('half_plane', 'finite_elements')
 
 
 @dataclass(frozen=True)
@@ -17,8 +16,6 @@ class SealBody(CheckedParameters):
 
     ValueError: a value is out of bounds, or the material has no stiffness.
     """
-
-    BODIES: ClassVar[tuple[str, ...]] = ('half_plane', 'finite_elements')
 
     sealing_diameter: float = parameter(
         6e-3, unit='m', lower=1e-4, upper=10.0, description='Of the seat (paper: 6 mm).'
@@ -38,6 +35,7 @@ class SealBody(CheckedParameters):
     body: str = parameter(
         'half_plane',
         unit='',
+        choices=BODIES,
         description='half_plane: the kernel of a half-plane, zero at the section height. finite_elements: a crowned '
         'section of that height.',
     )
@@ -47,6 +45,7 @@ class SealBody(CheckedParameters):
     section_hold: str = parameter(
         'bottom',
         unit='',
+        choices=('bottom', 'bottom_and_flanks', 'sliding_bottom'),
         description='What the groove holds, for finite_elements. bottom: it sticks. bottom_and_flanks: the flanks do '
         'not move along the axis either. sliding_bottom: the bottom slides freely.',
     )
@@ -58,10 +57,6 @@ class SealBody(CheckedParameters):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.body not in self.BODIES:
-            raise ValueError(f'SealBody.body = {self.body!r} is not one of {", ".join(self.BODIES)}')
-        if self.section_hold not in HOLDS:
-            raise ValueError(f'SealBody.section_hold = {self.section_hold!r} is not one of {", ".join(HOLDS)}')
         if self.body == 'finite_elements':
             self._check_section()
         if self.modulus <= 0.0:

@@ -24,25 +24,25 @@ class PathEnd(NamedTuple):
 def follow_path(
     model: OringModel,
     assembly: Assembly,
-    path: Callable[[float, OringState], Surroundings],
+    path: Callable[[float, OringState, float], Surroundings],
     start: OringState,
     stride: float = 1.0,
     guess: Callable[[OringState, float, float], OringState] | None = None,
 ) -> PathEnd:
     """Follow the equilibrium along a path of surroundings.
 
-    ``path`` gives the surroundings at a fraction of the path, 0 to 1, and the last equilibrium, from ``start`` at 0;
-    the first step is the fraction ``stride``. ``guess`` gives the start of Newton's method from the last equilibrium,
-    its fraction and the next one, by default the linear extrapolation of the last two equilibria. NotConvergedError: a
-    step fails at the smallest size; the message has the fraction reached.
+    ``path`` gives the surroundings at a fraction of the path, 0 to 1, the last equilibrium, from ``start`` at 0, and
+    its fraction; the first step is the fraction ``stride``. ``guess`` gives the start of Newton's method from the last
+    equilibrium, its fraction and the next one, by default the linear extrapolation of the last two equilibria.
+    NotConvergedError: a step fails at the smallest size; the message has the fraction reached.
     """
     done, state, before, total = 0.0, start, (0.0, start), 0
-    surroundings = path(0.0, start)
+    surroundings = path(0.0, start, 0.0)
     while done < 1.0:
         wanted = done + stride
         wanted = 1.0 if wanted > 1.0 - 0.1 * stride else wanted
         first = guess(state, done, wanted) if guess else _extrapolated(before, (done, state), wanted)
-        next_surroundings = path(wanted, state)
+        next_surroundings = path(wanted, state, done)
         try:
             after, steps = solve_equilibrium(model, assembly, next_surroundings, first)
         except NotConvergedError as error:

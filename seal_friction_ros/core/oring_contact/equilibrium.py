@@ -75,7 +75,7 @@ def make_model(
     center = mesh.nodes.mean(axis=0)
     quarter = np.array([section_diameter / 4.0, 0.0])
     inner, outer = (int(np.argmin(np.linalg.norm(mesh.nodes - center - side * quarter, axis=1))) for side in (-1, 1))
-    per_length = float(2.0 * np.pi * center[0] * rubber.elastic_modulus)
+    per_length = float(2.0 * np.pi * center[0] * rubber.modulus)
     return OringModel(
         mesh, make_elements(mesh), field or rubber, per_length * section_diameter, (inner, outer), guide * per_length
     )

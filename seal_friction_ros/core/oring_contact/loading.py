@@ -108,15 +108,15 @@ def squeeze_ring(case: OringCase, model: OringModel) -> LoadedRing:
     rod_travel = walls.rod_radius - inner
     gland_travel = walls.gland_radius - inner - case.geometry.section_diameter
 
-    def closing(share: float, _: OringState) -> Surroundings:
+    def closing(share: float, _: OringState, __: float) -> Surroundings:
         left = 1.0 - share
         rod, gland = walls.rod_radius - left * rod_travel, walls.gland_radius - left * gland_travel
         return walls._replace(rod_radius=rod, gland_radius=gland, penalty=walls.penalty / _SOFTER)
 
     def stretched(state: OringState, done: float, wanted: float) -> OringState:
-        return _stretched_with_walls(model, state, closing(done, state), closing(wanted, state))
+        return _stretched_with_walls(model, state, closing(done, state, done), closing(wanted, state, done))
 
-    def stiffening(share: float, _: OringState) -> Surroundings:
+    def stiffening(share: float, _: OringState, __: float) -> Surroundings:
         return walls._replace(penalty=walls.penalty * _SOFTER ** (share - 1.0))
 
     with _named(case, 'of the squeezed ring'):
@@ -143,7 +143,7 @@ def seat_ring(case: OringCase, model: OringModel, free: Assembly, squeezed: Load
     top = float(outline(model, squeezed.state)[:, 1].max())
     wall = squeezed.surroundings._replace(
         wall_position=top - seating * case.geometry.section_diameter,
-        transition=case.numerics.transition * case.rubber.elastic_modulus,
+        transition=case.numerics.transition * case.rubber.modulus,
     )
     with _named(case, 'of the ring on the downstream wall'):
         state, steps = solve_equilibrium(model, make_assembly(model, _fixed(model)), wall, squeezed.state)
@@ -174,13 +174,14 @@ def wetted_nodes(surroundings: Surroundings, position: FloatArray) -> BoolArray:
 def _holding(stress: FloatArray, pressure: float, start: int, direction: int) -> int:
     """Node with the peak stress of the first lip, from ``start`` on, that is above the pressure; else the highest one.
 
-    The fluid passes a lip whose peak stress is below its pressure; a lip ends where the stress has fallen to half of
-    its peak (our choice).
+    The fluid passes a lip whose peak stress is below its pressure; a lip ends where what the stress has above the
+    pressure has fallen to half (our choice).
     """
     order = (start + direction * np.arange(len(stress))) % len(stress)
     along = stress[order]
-    peak = np.maximum.accumulate(along)
-    behind = np.flatnonzero((peak > max(pressure, 0.0)) & (along < 0.5 * peak))
+    above = along - max(pressure, 0.0)
+    peak = np.maximum.accumulate(above)
+    behind = np.flatnonzero((peak > 0.0) & (above < 0.5 * peak))
     return int(order[np.argmax(along[: behind[0]] if len(behind) else along)])
 
 
@@ -194,9 +195,11 @@ def _raise_pressure(
 ) -> tuple[LoadedRing, float]:
     """Ring under the pressure ``target`` [Pa], and the pressure rise [Pa] to try in the next step."""
 
-    def rising(share: float, state: OringState) -> Surroundings:
-        risen = now.surroundings._replace(pressure=now.pressure + share * (target - now.pressure))
-        return risen._replace(wetted=wetted_nodes(risen, outline(model, state)))
+    def rising(share: float, state: OringState, done: float) -> Surroundings:
+        before, risen = (
+            now.surroundings._replace(pressure=now.pressure + part * (target - now.pressure)) for part in (done, share)
+        )
+        return risen._replace(wetted=wetted_nodes(before, outline(model, state)))
 
     total_rise = abs(target - now.pressure)
     with _named(case, f'between {now.pressure:.6g} and {target:.6g} Pa'):
@@ -210,7 +213,7 @@ def _apply_wall_friction(case: OringCase, model: OringModel, free: Assembly, loa
     if case.wall_friction == 0.0:
         return loaded
 
-    def rubbing(share: float, _: OringState) -> Surroundings:
+    def rubbing(share: float, _: OringState, __: float) -> Surroundings:
         return loaded.surroundings._replace(friction=share * case.wall_friction)
 
     with _named(case, f'at {loaded.pressure:.6g} Pa with wall_friction = {case.wall_friction}'):
@@ -241,7 +244,7 @@ def _check_unfolded(case: OringCase, model: OringModel, now: LoadedRing) -> None
 
 def _dry_walls(case: OringCase, model: OringModel) -> Surroundings:
     """Rod and gland at their final radii, no fluid, no downstream wall."""
-    geometry, elastic_modulus = case.geometry, case.rubber.elastic_modulus
+    geometry, elastic_modulus = case.geometry, case.rubber.modulus
     return Surroundings(
         rod_radius=geometry.rod_diameter / 2.0,
         gland_radius=geometry.gland_diameter / 2.0,

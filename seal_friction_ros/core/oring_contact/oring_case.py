@@ -135,7 +135,7 @@ def check_pressures(case: OringCase, pressures: tuple[float, ...]) -> None:
             raise ValueError(f'case {case.name}: pressure {pressure} Pa is not a gauge pressure, finite and 0 or more')
     if any(high <= low for low, high in pairwise(pressures)):
         raise ValueError(f'case {case.name}: pressures {list(pressures)} Pa do not increase')
-    limit = extrusion_pressure(case.groove.diametral_clearance, case.rubber.elastic_modulus)
+    limit = extrusion_pressure(case.groove.diametral_clearance, case.rubber.modulus)
     if pressures[-1] > limit:
         raise ValueError(
             f'case {case.name}: a pressure of {pressures[-1]:.6g} Pa extrudes the ring through a diametral clearance '

@@ -7,7 +7,7 @@ Example; docs/oring.md describes every field::
     geometry: {section_diameter: 2.62e-3, ring_inner_diameter: 15.54e-3, rod_diameter: ..., gland_diameter: ...}
     section: {shape: x_ring}            # optional: round without it; or outline: [[r, z], ...] [m]
     groove: {width: 3.6e-3, diametral_clearance: 0.1e-3}
-    rubber: {hardness: 70.0}            # or elastic_modulus [Pa]; mooney_ratio, bulk_modulus
+    rubber: {hardness: 70.0}            # or elastic_modulus [Pa], or ogden_moduli; see `Rubber`
     pressures: [0.0, 3.4e+6, 6.9e+6]    # [Pa, gauge]
     friction:                           # optional: without it --reading or a prior
       contact_shear: {shear_stress: 0.1e6, knee_stress: 0.26e6}   # or friction_coefficient, as in a seal file
@@ -33,21 +33,27 @@ from seal_friction_ros.core.foundation.parameters import (
     name_and_source,
     parameter,
 )
+from seal_friction_ros.core.foundation.units import in_si
 from seal_friction_ros.core.foundation.unknowns import Unknown, parse_unknowns
 from seal_friction_ros.core.friction.actuator import Uncertainty
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws.contact_shear import ShearLaw
 from seal_friction_ros.core.friction.laws.friction_coefficient import FrictionCoefficientLaw
 from seal_friction_ros.core.friction.seal_file import check_no_exponent, parse_part
-from seal_friction_ros.core.oring_contact.material import Rubber, elastic_modulus_of_hardness
+from seal_friction_ros.core.oring_contact.material import Rubber, elastic_modulus_of_hardness, modulus_of_ogden
 from seal_friction_ros.core.oring_contact.oring_case import Groove, OringCase, OringNumerics, check_pressures
 from seal_friction_ros.core.oring_contact.ring_friction import RingLaw, SealFriction
-from seal_friction_ros.core.oring_contact.section import Section, checked_outline, mirrored, section_of_shape
+from seal_friction_ros.core.oring_contact.section import Section, checked_outline, mirrored, rounded, section_of_shape
 
 SECTION_TRANSITION = 0.01
 """`OringNumerics.transition` of other sections than round ones: the stress of a lip is low, so it has to be sharp."""
+ROUNDED_TRANSITION = 0.005  # the same with a corner radius: the edge of a lip is lighter still (our choice)
+SHAPE_CORNER = 0.02  # radius of the corners of a shape over its height, unless given (our choice)
+SMALLEST_CORNER, LARGEST_CORNER = 0.005, 0.04
+"""corner radius over the height: below it the mesh is too large, above it `section_mesh` does not see an arc"""
 PTFE_MODULUS = 500.0e6  # [Pa] of PTFE at room temperature, 400 to 600 MPa (our choice)
 
+_OF_ANY = ('mirrored', 'corner_radius')  # keys of a section of any shape
 _KEYS = (
     'name', 'source', 'geometry', 'section', 'groove', 'rubber', 'cap', 'wall_friction', 'numerics', 'pressures',
     'friction', 'measured', 'unknown',
@@ -106,10 +112,12 @@ def parse_oring_case(document: Any) -> OringCaseFile:
     check_names(document, _KEYS, where)
     rubber = _rubber(document.get('rubber'), f'{where}: rubber')
     geometry = from_mapping(
-        SealGeometry, document.get('geometry'), f'{where}: geometry', elastic_modulus=rubber.elastic_modulus
+        SealGeometry, document.get('geometry'), f'{where}: geometry', elastic_modulus=rubber.modulus
     )
-    section = _section(document['section'], f'{where}: section') if 'section' in document else None
-    standard = {} if section is None else {'transition': SECTION_TRANSITION}
+    section, standard = None, {}
+    if 'section' in document:
+        section, transition = _section(document['section'], geometry, f'{where}: section')
+        standard = {'transition': transition}
     case = from_mapping(
         OringCase,
         {'wall_friction': document['wall_friction']} if 'wall_friction' in document else {},
@@ -124,6 +132,8 @@ def parse_oring_case(document: Any) -> OringCaseFile:
     )
     pressures = from_mapping(_Pressures, {'pressures': document.get('pressures')}, where).pressures
     check_pressures(case, pressures)
+    if section is not None and document['section'].get('shape') == 'wiper' and pressures != (0.0,):
+        raise ValueError(f'{where}: a wiper holds no pressure: give a pressure of 0 alone')
     friction = _friction(document, where)
     unknown = _unknown(document, case, friction is not None, where)
     measured = document.get('measured')
@@ -132,18 +142,33 @@ def parse_oring_case(document: Any) -> OringCaseFile:
     return OringCaseFile(case, pressures, source, friction, measured, unknown)
 
 
-def _section(values: Any, where: str) -> Section:
-    """Section of a shape with its proportions, or of an outline, which a piston has mirrored."""
+def _section(values: Any, geometry: SealGeometry, where: str) -> tuple[Section, float]:
+    """Section of a shape with its proportions, or of an outline, which a piston has mirrored; and its transition.
+
+    Corners of a shape that face the sliding wall are round; those of an outline are as drawn without a radius.
+    """
     if not isinstance(values, Mapping) or ('shape' in values) == ('outline' in values):
         raise ValueError(f'{where}: give one of shape and outline; got {values!r}')
-    others = {key: value for key, value in values.items() if key not in ('shape', 'outline', 'mirrored')}
+    others = {key: value for key, value in values.items() if key not in ('shape', 'outline', *_OF_ANY)}
     with named_errors(where):
         if 'shape' in values:
             section = section_of_shape(values['shape'], others)
         else:
             check_names(others, (), where)
             section = Section(checked_outline(np.array(values['outline'], dtype=float), 'outline'))
-    return mirrored(section) if values.get('mirrored') else section
+    section = mirrored(section) if values.get('mirrored') else section
+    radius = SHAPE_CORNER if 'shape' in values else 0.0
+    if 'corner_radius' in values:
+        radius = in_si(values['corner_radius'], 'm', f'{where}: corner_radius') / geometry.section_diameter
+    if radius == 0.0:
+        return section, SECTION_TRANSITION
+    if not SMALLEST_CORNER <= radius <= LARGEST_CORNER:
+        raise ValueError(
+            f'{where}: corner_radius is {radius:.3g} of the height of the section: 0, or {SMALLEST_CORNER} to '
+            f'{LARGEST_CORNER}, can be computed'
+        )
+    found = rounded(section, radius * section.height, outside=geometry.sliding_wall == 'bore')
+    return found, SECTION_TRANSITION if len(found.outline) == len(section.outline) else ROUNDED_TRANSITION
 
 
 def _cap(values: Any, section: Section | None, where: str) -> Rubber | None:
@@ -159,13 +184,17 @@ def _cap(values: Any, section: Section | None, where: str) -> Rubber | None:
 
 def _rubber(values: Any, where: str) -> Rubber:
     """Rubber from either its modulus or its hardness."""
-    if not isinstance(values, Mapping) or ('hardness' in values) == ('elastic_modulus' in values):
+    given = {'hardness', 'elastic_modulus'} & set(values) if isinstance(values, Mapping) else set()
+    if not isinstance(values, Mapping) or len(given) != 1 - ('ogden_moduli' in values and not given):
         raise ValueError(f'{where}: give one of hardness [Shore A] and elastic_modulus [Pa]; got {values!r}')
     others = {key: value for key, value in values.items() if key != 'hardness'}
     if 'hardness' in values:
         hardness = from_mapping(_Hardness, {'hardness': values['hardness']}, where).hardness
         with named_errors(where):
             others['elastic_modulus'] = elastic_modulus_of_hardness(hardness)
+    elif not given:
+        found = from_mapping(Rubber, {**others, 'elastic_modulus': 1e6}, where)
+        others['elastic_modulus'] = modulus_of_ogden(found.ogden_moduli, found.ogden_exponents)
     return from_mapping(Rubber, others, where)
 
 
@@ -231,9 +260,10 @@ def varied_ring(case: OringCase, values: Mapping[str, float]) -> OringCase:
             parts.setdefault(part, {})[field] = value
         elif name != FRICTION_COEFFICIENT:  # a factor on what is computed with the case
             others[name] = value
-    if 'elastic_modulus' in (rubber := parts.get('rubber', {})):
-        parts.setdefault('geometry', {})['elastic_modulus'] = rubber['elastic_modulus']
-    return replace(case, **{part: replace(getattr(case, part), **changed) for part, changed in parts.items()}, **others)
+    changed = {part: replace(getattr(case, part), **fields) for part, fields in parts.items()}
+    if 'rubber' in changed:
+        changed['geometry'] = replace(changed.get('geometry', case.geometry), elastic_modulus=changed['rubber'].modulus)
+    return replace(case, **changed, **others)
 
 
 def _unknown(document: Mapping[str, Any], case: OringCase, has_friction: bool, where: str) -> tuple[Unknown, ...]:

@@ -11,6 +11,7 @@ from scipy.optimize import minimize_scalar
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.friction.actuator import Seal, Uncertainty
 from seal_friction_ros.core.friction.geometry import SealGeometry
+from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
 from seal_friction_ros.core.friction.laws.contact_shear import HIGHEST_KNEE, LOWEST_KNEE, ContactShear, ShearLaw
 from seal_friction_ros.core.friction.laws.friction_coefficient import FrictionCoefficientLaw
 from seal_friction_ros.core.friction.laws.law import FrictionLaw
@@ -73,9 +74,12 @@ def friction_law(
 ) -> FrictionLaw:
     """Friction of a ring over pressure, for a seal file, by its contacts on the sliding wall at pressures [Pa, gauge].
 
-    ValueError: fewer than two pressures, or a friction that falls with pressure.
+    A seal that was computed without pressure alone, a wiper, has one friction. ValueError: one other pressure, or a
+    friction that falls with pressure.
     """
     at = tuple(pressures)
+    if at == (0.0,):
+        return ConstantCoulomb(friction_of_contact(law, contacts[0]))
     if isinstance(law, ShearLaw):
         return ContactShear(law.shear_stress, law.knee_stress, at, sheared_areas(at, contacts, law.knee_stress))
     return PhysicsBased(geometry, NormalForceTable(at, tuple(contact.force for contact in contacts)), law)

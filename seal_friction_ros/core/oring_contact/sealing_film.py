@@ -115,8 +115,13 @@ def edge_strengths(contact: WallContact, pressure: float, transition: float) -> 
 def _strength(distance: FloatArray, rise: FloatArray, transition: float) -> float:
     r"""Strength by least squares of :math:`\sigma^2 = k^2 \xi (1 - \xi / 2a)`, that of Hertz; nan: too few nodes.
 
-    The half width a follows from the first node that has `_RISE` of the peak.
+    The half width a follows from the first node that has `_RISE` of the peak, the first from the edge on;
+    behind it the stress falls by a tenth or more (our choice).
     """
+    peak = np.maximum.accumulate(rise)
+    fallen = (peak > _CLEAR * transition) & (rise < 0.9 * peak)
+    rise = rise[: int(np.argmax(fallen)) if fallen.any() else len(rise)]
+    distance = distance[: len(rise)]
     top = int(np.argmax(rise >= _RISE * rise.max()))
     fitted = (np.arange(len(rise)) <= top) & (rise > _CLEAR * transition)
     if fitted.sum() < _FEWEST:

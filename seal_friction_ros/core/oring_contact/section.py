@@ -12,6 +12,8 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 
+CORNER = np.deg2rad(25.0)  # a turn of the outline by more is a corner, which stays a node of a mesh (our choice)
+NEAR_WALL = 0.12  # distance from the innermost or outermost point over the height, within which the outline may touch
 _ARC = np.deg2rad(3.0)  # angle between the points of an arc
 
 
@@ -104,6 +106,33 @@ def mirrored(section: Section) -> Section:
     return Section((turn * section.outline)[::-1], None if section.cap is None else (turn * section.cap)[::-1])
 
 
+def rounded(section: Section, radius: float, *, outside: bool) -> Section:
+    """Section whose corners on the inside or ``outside`` are arcs of a ``radius``, smaller where an edge is too short.
+
+    A lip that ends at a sharp corner has no finite rise of pressure there.
+    """
+    low, high = section.outline[:, 0].min(), section.outline[:, 0].max()
+
+    def with_arcs(polygon: FloatArray) -> FloatArray:
+        before, after = polygon - np.roll(polygon, 1, axis=0), np.roll(polygon, -1, axis=0) - polygon
+        turns = np.arctan2(_cross(before, after), (before * after).sum(axis=1))
+        near = (high - polygon[:, 0] if outside else polygon[:, 0] - low) < NEAR_WALL * (high - low)
+        points = []
+        for corner, back, on, turn, faces in zip(polygon, before, after, turns, near, strict=True):
+            if not faces or turn < CORNER:
+                points.append(corner[None])
+                continue
+            half, shorter = np.tan(0.5 * turn), min(np.linalg.norm(back), np.linalg.norm(on))
+            fitting = min(radius, 0.45 * float(shorter) / half)
+            direction = back / np.linalg.norm(back)
+            center = corner - fitting * half * direction + fitting * np.array([-direction[1], direction[0]])
+            begin = np.arctan2(-direction[0], direction[1])
+            points.append(_arc(tuple(center), fitting, begin, begin + turn))
+        return np.concatenate(points)
+
+    return Section(with_arcs(section.outline), None if section.cap is None else with_arcs(section.cap))
+
+
 # -- shapes -----------------------------------------------------------------------------------------------------------
 
 
@@ -144,18 +173,58 @@ def u_cup(
     ``heel`` is the height of its back. The flanks rise from the heel to the edges of the lips, which lie ``tip``
     behind the front.
     """
-    if not (0.0 < lip_thickness < 0.5 and 0.0 < tip < groove_depth < length and 0.2 < heel <= 1.0):
-        raise ValueError('u_cup: lips thinner than half, tip < groove_depth < length, heel 0.2 to 1 are needed')
+    lip = _lip('u_cup', length, 0.5 * heel, groove_depth, lip_thickness, tip)
+    return Section(checked_outline(np.concatenate((lip, (lip * (-1.0, 1.0))[::-1])), 'u_cup'))
+
+
+def lip_seal(
+    length: float = 1.3,
+    heel: float = 0.84,
+    groove_depth: float = 0.65,
+    lip_thickness: float = 0.2,
+    tip: float = 0.3,
+) -> Section:
+    """Asymmetric lip seal of height 1: the lip on the inside slides; that on the outside is longer, thicker, steeper.
+
+    Its ``lip_thickness`` is 0.1 larger, its edge half of ``tip`` behind the front, its flank twice as near to the wall.
+    """
+    rise = (1.0 - heel) / 3.0
+    inside = _lip('lip_seal', length, 0.5 - 2.0 * rise, groove_depth, lip_thickness, tip)
+    outside = _lip('lip_seal', length, 0.5 - rise, groove_depth, lip_thickness + 0.1, 0.5 * tip)
+    return Section(checked_outline(np.concatenate((outside, (inside * (-1.0, 1.0))[::-1])), 'lip_seal'))
+
+
+def wiper(
+    length: float = 1.1,
+    heel: float = 0.8,
+    groove_depth: float = 0.5,
+    lip_thickness: float = 0.3,
+    tip: float = 0.1,
+) -> Section:
+    """Wiper of height 1: a straight leg on the outside, a lip on the inside that points away from the pressure.
+
+    It holds no pressure.
+    """
+    lip = _lip('wiper', length, heel - 0.5, groove_depth, lip_thickness, tip)
+    leg = np.concatenate((lip[:3], [(0.5 - lip_thickness, -0.5 * length), (0.5, -0.5 * length), (0.5, 0.5 * length)]))
+    turned = np.concatenate((leg, (lip * (-1.0, 1.0))[::-1])) * (1.0, -1.0)
+    return Section(checked_outline(turned, 'wiper'))
+
+
+def _lip(shape: str, length: float, flank: float, groove_depth: float, lip_thickness: float, tip: float) -> FloatArray:
+    """Outer half of a lip in front of a body that reaches to r = ``flank``, from the bottom of its groove to its back.
+
+    Proportions are ours.
+    """
+    if not (0.0 < lip_thickness < 0.5 and 0.0 < tip < groove_depth < length and 0.1 < flank <= 0.5):
+        raise ValueError(f'{shape}: lips thinner than half, tip < groove_depth < length, heel below 1 are needed')
     front, back = -0.5 * length, 0.5 * length
-    inner = 0.5 - lip_thickness
-    root = front + groove_depth
-    half = np.array([
+    root, inner = front + groove_depth, 0.5 - lip_thickness
+    return np.array([
         (0.0, root), (0.5 * inner, root), (inner, root - 0.5 * inner),  # bottom of the groove, bevelled
         (0.5 - 0.75 * lip_thickness, front), (0.5 - 0.35 * lip_thickness, front),  # front of the lip
-        (0.5, front + tip), (0.5 * heel, root), (0.5 * heel, back - 0.05), (0.5 * heel - 0.05, back),
+        (0.5, front + tip), (flank, root), (flank, back - 0.05), (flank - 0.05, back),
     ])  # fmt: skip
-    outer = np.concatenate((half, (half * (-1.0, 1.0))[::-1]))
-    return Section(checked_outline(outer, 'u_cup'))
 
 
 def capped_ring(cap_height: float = 0.3, cap_length: float = 0.8) -> Section:
@@ -176,7 +245,7 @@ def capped_ring(cap_height: float = 0.3, cap_length: float = 0.8) -> Section:
 
 
 Shape = Callable[..., Section]
-SHAPES: dict[str, Shape] = {'circle': circle, 'x_ring': x_ring, 'u_cup': u_cup, 'capped_ring': capped_ring}
+SHAPES: dict[str, Shape] = {one.__name__: one for one in (circle, x_ring, u_cup, lip_seal, wiper, capped_ring)}
 
 
 def section_of_shape(shape: str, proportions: Mapping[str, Any]) -> Section:

@@ -11,12 +11,13 @@ from scipy.spatial.distance import cdist
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.oring_contact.mesh import Mesh
-from seal_friction_ros.core.oring_contact.section import Section
+from seal_friction_ros.core.oring_contact.section import CORNER, NEAR_WALL, Section
 
-_CORNER = np.deg2rad(25.0)  # a turn of the outline by more is a corner, which stays a node (our choice)
 _GROWTH = 0.35  # of the edges per distance from the outline (our choice)
 _COARSE = 2.0  # edges of the outline that face no wall, over those that do (our choice)
-_NEAR_WALL = 0.12  # distance from the innermost or outermost point over the height, within which the outline may touch
+_SHARP, _ON_ARC = 0.05, 0.8
+"""radius over the height below which an arc is a rounded corner, whose edges are shorter than others by radius over
+height times the second number (our choice)"""
 _SMALLEST = 0.2  # shortest edge over the wanted one, in thin parts
 _ROUNDS = 40
 _SMOOTHING = 8
@@ -57,7 +58,7 @@ def _points_along(section: Section, edge: float, across: float) -> tuple[FloatAr
     dense = _subdivided(section.outline, 0.25 * edge)
     sizes = _wanted_sizes(dense, section, edge, across)
     turn = np.abs(_turns(section.outline))
-    corners = section.outline[turn > _CORNER]
+    corners = section.outline[turn > CORNER]
     if section.cap is not None:
         corners = np.concatenate((corners, section.cap[[0, -1]]))
     if len(corners) < 2:
@@ -97,12 +98,24 @@ def _turns(polygon: FloatArray) -> FloatArray:
     return turn
 
 
+def _rounded_corners(polygon: FloatArray, sharpest: float) -> tuple[FloatArray, FloatArray]:
+    """Points of arcs of a radius below ``sharpest``, shape (n, 2), and their radii, shape (n,)."""
+    length = np.linalg.norm(np.roll(polygon, -1, axis=0) - polygon, axis=1)
+    turns = np.abs(_turns(polygon))
+    radii = np.minimum(length, np.roll(length, 1)) / np.maximum(turns, 1e-9)
+    arc = (turns < CORNER) & (radii < sharpest)
+    return polygon[arc], radii[arc]
+
+
 def _wanted_sizes(dense: FloatArray, section: Section, edge: float, across: float) -> FloatArray:
     """Wanted edge along the outline: short at the walls and in thin parts, growing gradually from there."""
     low, high = section.outline[:, 0].min(), section.outline[:, 0].max()
-    near = np.minimum(dense[:, 0] - low, high - dense[:, 0]) < _NEAR_WALL * (high - low)
+    near = np.minimum(dense[:, 0] - low, high - dense[:, 0]) < NEAR_WALL * (high - low)
     sizes = np.where(near, edge, _COARSE * edge)
     sizes = np.clip(np.minimum(sizes, _thickness(dense, section.outline) / across), _SMALLEST * edge, None)
+    arcs, radii = _rounded_corners(section.outline, _SHARP * (high - low))
+    on_arcs = _ON_ARC * edge * radii / (high - low) + _GROWTH * cdist(dense, arcs)
+    sizes = np.minimum(sizes, on_arcs.min(axis=1, initial=np.inf))
     grown: FloatArray = (sizes + _GROWTH * cdist(dense, dense)).min(axis=1)
     return grown
 
@@ -117,7 +130,7 @@ def _thickness(dense: FloatArray, polygon: FloatArray) -> FloatArray:
     with np.errstate(divide='ignore', invalid='ignore'):
         far = (between[..., 0] * along[None, :, 1] - between[..., 1] * along[None, :, 0]) / turn
         at = (between[..., 0] * inward[:, None, 1] - between[..., 1] * inward[:, None, 0]) / turn
-    far[~((far > 1e-3 * np.ptp(polygon)) & (at >= 0.0) & (at <= 1.0))] = np.inf
+    far[~((far > 1e-3 * np.ptp(polygon, axis=0).max()) & (at >= 0.0) & (at <= 1.0))] = np.inf
     chord: FloatArray = far.min(axis=1)
     return chord
 
@@ -148,10 +161,11 @@ def _refined(fixed: FloatArray, sizes: FloatArray, outline: FloatArray) -> tuple
 
 def _triangles(points: FloatArray, outline: FloatArray) -> IntArray:
     """Counterclockwise triangles of Delaunay whose middle is inside the outline."""
-    corners = np.asarray(Delaunay(points).simplices, dtype=int)
+    corners: IntArray = np.asarray(Delaunay(points).simplices, dtype=int)
+    size = float(np.ptp(outline, axis=0).max())
     corners = corners[inside(points[corners].mean(axis=1), outline)]
     area = _doubled_areas(points, corners)
-    corners = corners[np.abs(area) > 1e-9 * np.ptp(outline) ** 2]
+    corners = corners[np.abs(area) > 1e-9 * size**2]
     area = _doubled_areas(points, corners)
     corners[area < 0.0] = corners[area < 0.0][:, ::-1]
     return corners

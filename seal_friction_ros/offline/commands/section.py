@@ -15,7 +15,7 @@ def add_parser(commands: Any) -> None:
         'section x_ring --height 3.53mm --rod 19.346mm --gland 25.7mm --sliding bore --pressure 7bar',
         'section my_seal.dxf --rod 36mm --gland 46mm --pressure 50bar --reading 50bar,0.1,40N --out seal.yaml',
     )  # fmt: skip
-    text = 'x_ring, u_cup, capped_ring, circle, or the outline in a file: CSV (r [mm], z [mm]) or DXF'
+    text = 'x_ring, u_cup, lip_seal, wiper, capped_ring, circle, or the outline in a file: CSV (r [mm], z [mm]) or DXF'
     parser.add_argument('drawing', metavar='SHAPE|FILE', help=text)
     cli.add_options(parser, _OPTIONS)
     parser.add_argument('--mirrored', action='store_true', help='swap the inner and the outer side of the section')
@@ -48,10 +48,13 @@ _OPTIONS: dict[str, tuple[str, cli.Settings]] = {
     '--inner': _diameter('free inner diameter of the seal; default: as drawn, or in the middle of the gap'),
     '--groove': _diameter('width of the groove; default: 1.25 times the length of the section'),
     '--clearance': _diameter('diametral clearance behind the seal, default 0', default=0.0),
+    '--corner-radius': _diameter(
+        'radius of the corners that face the sliding wall; default: 2 %% of the height, of a drawing as drawn'
+    ),
     '--pressure': ('gauge, in Pa or with a unit', {'type': _pressure, 'nargs': '+', 'required': True, 'metavar': 'P'}),
     '--hardness': ('of the rubber, Shore A, default 70', {'type': float, 'default': 70.0, 'metavar': 'A'}),
     '--test': ('tension test of the rubber: CSV (strain [1], stress [MPa])', {'type': Path, 'metavar': 'FILE'}),
-    '--model': ('of the rubber of --test, default yeoh', {'choices': ('mooney', 'yeoh'), 'default': 'yeoh'}),
+    '--model': ('of the rubber of --test, default yeoh', {'choices': ('mooney', 'yeoh', 'ogden'), 'default': 'yeoh'}),
     '--lines': ('of the mesh, as numerics.lines of a case', {'type': cli.at_least(13), 'metavar': 'N'}),
     '--name': ('of the seal; default: of the drawing', {'default': ''}),
 }

@@ -38,6 +38,7 @@ from seal_friction_ros.core.oring_contact.oring_case_file import OringCaseFile, 
 from seal_friction_ros.core.oring_contact.ring_friction import DISCRETISATION
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.contact.mesh_levels import COARSER, FINER, MOST_MESH_ERROR, change_of, other_lines
+from seal_friction_ros.offline.contact.section_files import with_files
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty
 from seal_friction_ros.offline.work.executor import Workers
 from seal_friction_ros.offline.work.finished_parts import Kept, Part, Values, part_key, try_parts
@@ -64,7 +65,7 @@ def read_case(name: str, parse: Callable[[Any, Callable[[str], OringCaseFile]], 
     path = config_path('ehl', name)
     document = read_yaml(path)
     with named_errors(path):
-        return parse(document, lambda oring: load_oring(oring, path.parent))
+        return parse(with_files(document, path.parent), lambda oring: load_oring(oring, path.parent))
 
 
 def load_oring(name: str, beside: Path) -> OringCaseFile:

@@ -35,6 +35,7 @@ from seal_friction_ros.offline.contact.uncertainty import check_unknown
 from seal_friction_ros.offline.work.progress import progress
 from seal_friction_ros.offline.work.seal_writer import rounded, rounded_numbers
 
+_UNPRESSURISED = 1e5  # [Pa] up to which a seal counts as without pressure (our choice)
 DIGITS = 8  # of a computed number in a seal file
 ON_OTHER_MESHES = (
     'normal_force_N', 'wall_force_N', 'peak_contact_stress_Pa', 'contact_width_m', 'area_deformation_gain',
@@ -108,8 +109,8 @@ class Computed(NamedTuple):
 
     @property
     def friction_law(self) -> FrictionLaw | None:
-        """Friction over pressure; None without friction, or with one pressure."""
-        if self.file.friction is None or len(self.results) < 2:
+        """Friction over pressure; None without friction, or with one pressure above 0."""
+        if self.file.friction is None or (len(self.results) < 2 and self.results[0].pressure > 0.0):
             return None
         contacts = [sliding_contact(self.file.case, result) for result in self.results]
         law, pressures = self.file.friction.law, self.summary.pressure_Pa
@@ -144,7 +145,8 @@ def compute_file(file: OringCaseFile, path: Path, task: Task | None = None) -> C
         check_pressures(file.case, wanted)
         if task.fluid is not None and min(task.fluid) <= 0.0:
             raise ValueError(f'case {file.case.name}: a film needs a viscosity and a speed above 0, not {task.fluid}')
-        if (task.for_seal_file or readings) and len(wanted) < 2:
+        without_pressure = wanted == (0.0,) and file.case.section is not None
+        if (readings or (task.for_seal_file and not without_pressure)) and len(wanted) < 2:
             raise ValueError(f'case {file.case.name}: a law over pressure needs two pressures at least')
         if task.law_from is not None:
             file = dataclasses.replace(file, friction=friction_after(parse_seal(read_yaml(task.law_from))))
@@ -202,7 +204,7 @@ def films_of(
     if fluid is None:
         return ()
     face = case.cap or case.rubber
-    elasticity = 4.0 / 3.0 * face.elastic_modulus, case.numerics.transition * case.rubber.elastic_modulus
+    elasticity = 4.0 / 3.0 * face.modulus, case.numerics.transition * case.rubber.modulus
     return tuple(seal_film(sliding_contact(case, one), one.pressure, elasticity, fluid) for one in results)
 
 
@@ -224,7 +226,7 @@ def _summary(
         pressure_Pa=tuple(result.pressure for result in results),
         normal_force_N=normal,
         wall_force_N=tuple(contact.wall_force for contact in contacts),
-        stretch_force_N=stretch_force(dataclasses.replace(geometry, elastic_modulus=file.case.rubber.elastic_modulus)),
+        stretch_force_N=stretch_force(dataclasses.replace(geometry, elastic_modulus=file.case.rubber.modulus)),
         axial_force_N=axial,
         peak_contact_stress_Pa=tuple(contact.peak_stress for contact in contacts),
         contact_width_m=tuple(contact.width for contact in contacts),
@@ -271,7 +273,7 @@ def seal_document(computed: Computed, spread: Spread | None = None) -> dict[str,
         'stiction': friction.stiction,
         **({'stiction_ratio': rounded(friction.stiction_ratio, 3)} if friction.stiction_ratio else {}),
         'uncertainty': asdict(friction.uncertainty) | {'relative_std': rounded(found, 3)},
-        'identified_pressure': [pressures[0], pressures[-1]],
+        'identified_pressure': [pressures[0], pressures[-1] or _UNPRESSURISED],
         **({'identified_speed': [min(speeds), max(speeds)]} if speeds else {}),
     }
 
@@ -279,9 +281,13 @@ def seal_document(computed: Computed, spread: Spread | None = None) -> dict[str,
 def seal_comment(computed: Computed) -> str:
     """Comment at the beginning of that seal file."""
     summary = computed.summary
-    return (
+    text = (
         'Made by `seal_friction oring`, which computes the contact from geometry and rubber, see docs/oring.md.\n'
-        f'Normal force [N]: {", ".join(f"{force:.5g}" for force in summary.normal_force_N)}.\n'
-        f'As a line over axial force: area_deformation_gain: {summary.area_deformation_gain:.6g} [1], '
+        f'Normal force [N]: {", ".join(f"{force:.5g}" for force in summary.normal_force_N)}.'
+    )
+    if summary.area_deformation_gain is None:
+        return text
+    return (
+        f'{text}\nAs a line over axial force: area_deformation_gain: {summary.area_deformation_gain:.6g} [1], '
         f'radial_force: {summary.radial_force_N:.6g} [N].'
     )

@@ -1,6 +1,7 @@
-"""Files that a case names: the drawing of a section, CSV or DXF -> polygon in metres; a tension test -> rubber."""
+"""Files that a case names: drawing of a section -> polygon in metres; tension test -> rubber; surface -> roughness."""
 
 import re
+import zipfile
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.foundation.units import QUANTITIES, QUANTITY_OF, unit_size
+from seal_friction_ros.core.lubrication.measured_topography import Roughness, measured_roughness, topography_of
 from seal_friction_ros.core.oring_contact.material import Rubber, rubber_of_tension
 from seal_friction_ros.core.oring_contact.section import checked_outline
 from seal_friction_ros.packages import needed
@@ -20,6 +22,8 @@ _SAG = 1e-3  # between curve and chord, over the size of the drawing (our choice
 _GAP = 1e-4  # between the ends of two lines that meet, over the size of the drawing (our choice)
 _HEAD = re.compile(r'\s*([a-z]+)\s*[\[(_]\s*(\w+?)\s*[\])]?\s*', re.IGNORECASE)
 _EXAMPLES = {'length': 'mm', 'number': '1', 'pressure': 'MPa'}
+_X3P_TYPES = {'I': '<i2', 'L': '<i4', 'F': '<f4', 'D': '<f8'}
+_MOST_XML = 1_000_000  # bytes
 _DXF_UNITS = {1: 'in', 4: 'mm', 5: 'cm', 6: 'm', 13: 'um'}
 
 
@@ -50,7 +54,8 @@ def read_tension(path: Path, model: str) -> Rubber:
 def with_files(document: Any, folder: Path) -> Any:
     """Document of a case with the content of files that it names, paths from ``folder``.
 
-    These are the ``file`` of its section, a drawing, and the ``test`` of its rubber with a ``model``, a tension test.
+    These are the ``file`` of its section, a drawing; the ``test`` of its rubber with a ``model``, a tension test; and
+    ``wall`` and ``seal`` of its topography, measured surfaces.
     """
     document = dict(document) if isinstance(document, Mapping) else document
     section = _part(document, 'section', 'file')
@@ -61,7 +66,63 @@ def with_files(document: Any, folder: Path) -> Any:
     if rubber:
         found = read_tension(folder / rubber.pop('test'), rubber.pop('model', 'yeoh'))
         document['rubber'] = {**asdict(found), **rubber}
+    surfaces = {of: _part(document, 'topography', of) for of in ('wall', 'seal')}
+    if any(surfaces.values()):
+        rough = {of: _read_roughness(folder / part[of]) if part else None for of, part in surfaces.items()}
+        others = {key: value for key, value in document['topography'].items() if key not in rough or rough[key] is None}
+        document['topography'] = {**topography_of(rough['wall'], rough['seal']), **others}
     return document
+
+
+def _read_roughness(path: Path) -> Roughness:
+    with named_errors(path), named_errors('cannot be read', OSError):
+        return measured_roughness(*read_heights(path))
+
+
+def read_heights(path: Path) -> tuple[FloatArray, tuple[float, float]]:
+    """Heights of a surface [m], shape (m, n), and their steps across and along the motion [m].
+
+    A CSV file is a profile, ``x [mm], z [um]`` at even steps; an X3P file (ISO 25178-72) has a profile or a map, its x
+    along the motion. ValueError: the file is neither.
+    """
+    if path.suffix.lower() == '.csv':
+        x, z = _columns(path, {'x': 'length', 'z': 'length'}).T
+        steps = np.diff(x)
+        if len(x) < 2 or not steps.min() > 0.98 * steps.max() > 0.0:
+            raise ValueError('the steps of x are not even and rising')
+        return z[None], (1.0, float(steps.mean()))
+    if path.suffix.lower() != '.x3p':
+        raise ValueError('not one of the surfaces that can be read, .csv, .x3p')
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return _x3p_heights(archive)
+    except (zipfile.BadZipFile, KeyError) as error:
+        raise ValueError(f'not an X3P archive: {error}') from None
+
+
+def _x3p_heights(archive: zipfile.ZipFile) -> tuple[FloatArray, tuple[float, float]]:
+    """Heights of an archive: its main.xml says what its binary data are, all in metres."""
+    text = archive.read('main.xml')[:_MOST_XML].decode('utf-8', 'replace')
+
+    def entry(tag: str, of: str = text) -> str:
+        found = re.search(rf'<(?:\w+:)?{tag}\b[^>]*>(.*?)</(?:\w+:)?{tag}>', of, re.DOTALL)
+        if found is None:
+            raise ValueError(f'its main.xml has no {tag}')
+        return found[1].strip()
+
+    axis = {name: entry(name) for name in ('CX', 'CY', 'CZ')}
+    kind = entry('DataType', axis['CZ'])
+    columns, rows = int(entry('SizeX')), int(entry('SizeY'))
+    data, dtype = archive.getinfo(entry('PointDataLink').lstrip('/')), np.dtype(_X3P_TYPES.get(kind, 'V1'))
+    if kind not in _X3P_TYPES or data.file_size != rows * columns * dtype.itemsize:
+        raise ValueError(f'its data are not {columns} x {rows} heights of type {kind}: one layer of I, L, F or D')
+    heights = np.frombuffer(archive.read(data), dtype).reshape(rows, columns).astype(float)
+    if kind in 'IL':
+        heights *= float(entry('Increment', axis['CZ']))
+    x, y = (
+        float(entry('Increment', axis[name])) if size > 1 else 1.0 for name, size in (('CX', columns), ('CY', rows))
+    )
+    return heights, (y, x)
 
 
 def _part(document: Any, part: str, key: str) -> dict[str, Any]:

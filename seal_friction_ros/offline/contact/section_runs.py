@@ -21,6 +21,7 @@ class Gland(NamedTuple):
     clearance: float = 0.0
     height: float | None = None
     inner: float | None = None
+    corner_radius: float | None = None  # of the section where it faces the sliding wall; None: as drawn
 
 
 def section_document(
@@ -57,7 +58,11 @@ def section_document(
             'gland_diameter': gland.gland,
             'sliding_wall': gland.sliding,
         },
-        'section': {**part, **({'mirrored': True} if mirrored else {})},
+        'section': {
+            **part,
+            **({'mirrored': True} if mirrored else {}),
+            **({} if gland.corner_radius is None else {'corner_radius': gland.corner_radius}),
+        },
         'groove': {
             'width': _ROOM * length if gland.groove is None else gland.groove,
             'diametral_clearance': gland.clearance,

@@ -77,7 +77,7 @@ def _friction_text(computed: Computed, frictions: Sequence[float]) -> str:
 def _film_text(pressure: float, out: float | None, back: float | None, leakage: float | None) -> str:
     text = f'  {pressure / BAR:8.2f} bar: film of a smooth seal'
     if out is None or back is None or leakage is None:
-        return f'{text}: unknown, a lip ends at a corner or has too few nodes for its edge'
+        return f'{text}: unknown, a lip ends at a corner or has too few nodes for its edge: more --lines'
     return f'{text} {out / UM:.3g} um out, {back / UM:.3g} um back, leakage {leakage / MM**3:.3g} mm3 per m of stroke'
 
 

@@ -196,8 +196,8 @@ def test_contact_force_of_a_small_squeeze_is_that_of_finite_strain():
 @pytest.mark.parametrize(
     ('seal', 'words'),
     [
-        ({'body': 'foam'}, "body = 'foam' is not one of half_plane, finite_elements"),
-        ({'section_hold': 'glue'}, "section_hold = 'glue' is not one of bottom, bottom_and_flanks, sliding_bottom"),
+        ({'body': 'foam'}, "body = 'foam' is none of half_plane, finite_elements"),
+        ({'section_hold': 'glue'}, "section_hold = 'glue' is none of bottom, bottom_and_flanks, sliding_bottom"),
         ({'body': 'finite_elements', 'section_height': 3e-3}, 'section_height = 0.003 m reaches the axis'),
         ({'body': 'finite_elements', 'section_width': 2.6e-3}, 'section_width = 0.0026 m leaves 0.000155 m'),
         ({'body': 'finite_elements', 'section_width': 0.6e-3}, 'section_width = 0.0006 m is not above'),

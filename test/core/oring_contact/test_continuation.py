@@ -37,7 +37,7 @@ class Equilibrium:
 def followed(monkeypatch):
     def follow(equilibrium: Equilibrium, stride: float, **more):
         monkeypatch.setattr(continuation, 'solve_equilibrium', equilibrium)
-        return follow_path(None, None, lambda share, _: at(share), START, stride, **more)
+        return follow_path(None, None, lambda share, *_: at(share), START, stride, **more)
 
     return follow
 

@@ -15,7 +15,6 @@ from seal_friction_ros.core.oring_contact.material import (
     Rubber,
     elastic_modulus_of_hardness,
     hardness_of_elastic_modulus,
-    mooney_rivlin_constants,
 )
 from seal_friction_ros.core.oring_contact.oring_case import (
     Groove,
@@ -78,8 +77,8 @@ def test_modulus_of_a_hardness_is_that_of_gent():
 
 def test_constants_of_mooney_and_rivlin_share_the_shear_modulus_in_their_ratio():
     """E = 6 MPa: 2 (C10 + C01) = 2 MPa."""
-    assert mooney_rivlin_constants(Rubber(6e6, mooney_ratio=0.25)) == pytest.approx((0.8e6, 0.2e6))
-    assert mooney_rivlin_constants(Rubber(6e6, mooney_ratio=0.0)) == (1e6, 0.0)
+    assert Rubber(6e6, mooney_ratio=0.25).terms == pytest.approx({2.0: 0.8e6, -2.0: 0.2e6})
+    assert Rubber(6e6, mooney_ratio=0.0).terms == {2.0: 1e6, -2.0: 0.0}
 
 
 def test_rubber_is_nearly_incompressible_from_20_times_its_modulus_on():
@@ -174,6 +173,27 @@ def test_case_file_makes_a_ring_whose_geometry_knows_its_modulus():
     assert given.case.rubber == Rubber(6e6, mooney_ratio=0.1)
     assert (given.case.geometry.elastic_modulus, given.case.wall_friction) == (6e6, 0.02)
     assert parse_oring_case(document(numerics={'lines': 17})).case.numerics.lines == 17
+
+
+def test_constants_of_ogden_give_the_modulus_and_a_hardness_beside_them_scales_them():
+    ogden = {'ogden_moduli': ['0.63 MPa', '1.2 kPa', '-0.01 MPa'], 'ogden_exponents': [1.3, 5.0, -2.0]}
+    alone = parse_oring_case(document(rubber=ogden)).case
+    assert alone.rubber.modulus == pytest.approx(1.5 * (0.63e6 * 1.3 + 1.2e3 * 5.0 + 0.01e6 * 2.0))
+    assert alone.geometry.elastic_modulus == alone.rubber.modulus
+    scaled = parse_oring_case(document(rubber={**ogden, 'hardness': 70.0})).case.rubber
+    assert scaled.modulus == pytest.approx(elastic_modulus_of_hardness(70.0))
+    shares = [scaled.terms[alpha] / alone.rubber.terms[alpha] for alpha in (1.3, 5.0, -2.0)]
+    assert shares == pytest.approx([scaled.modulus / alone.rubber.modulus] * 3)
+    with pytest.raises(ValueError, match='give one of hardness'):
+        parse_oring_case(document(rubber={'mooney_ratio': 0.1}))
+
+
+def test_a_relaxed_ring_relaxes_whatever_its_hardness_is_found_to_be():
+    rubber = {'hardness': 70.0, 'prony_shares': [0.4], 'prony_times': ['1 min'], 'time_since_mounting': '1 h'}
+    case = parse_oring_case(document(rubber=rubber)).case
+    assert case.geometry.elastic_modulus == pytest.approx(0.6 * elastic_modulus_of_hardness(70.0))
+    harder = varied_ring(case, {'rubber.hardness': 80.0})
+    assert harder.geometry.elastic_modulus == pytest.approx(0.6 * elastic_modulus_of_hardness(80.0))
 
 
 def test_case_file_has_the_friction_of_a_seal_file_and_what_was_measured():

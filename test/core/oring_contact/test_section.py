@@ -12,6 +12,7 @@ from seal_friction_ros.core.oring_contact.loading import _check_unfolded, _holdi
 from seal_friction_ros.core.oring_contact.material import Rubber
 from seal_friction_ros.core.oring_contact.oring_case import Groove, OringCase, OringNumerics
 from seal_friction_ros.core.oring_contact.results import OringResult, evaluate_contact, oring_results
+from seal_friction_ros.core.oring_contact.sealing_film import edge_strengths, seal_film
 from seal_friction_ros.core.oring_contact.section import (
     SHAPES,
     Section,
@@ -19,6 +20,7 @@ from seal_friction_ros.core.oring_contact.section import (
     first_crossing,
     mirrored,
     placed,
+    rounded,
     section_of_shape,
     signed_area,
 )
@@ -106,6 +108,17 @@ def test_inside_follows_the_outline_of_a_hollow_shape():
     assert inside(np.array([(0.0, 0.3), (0.0, -0.3), (0.45, -0.3)]), cup).tolist() == [True, False, True]
 
 
+def test_corners_that_face_the_wall_become_arcs_and_no_others():
+    inside_out = rounded(Section(SQUARE), 0.1, outside=False)
+    assert signed_area(inside_out.outline) == pytest.approx(1.0 - 2.0 * (1.0 - np.pi / 4.0) * 0.1**2, rel=1e-4)
+    assert (inside_out.outline[:, 0] == 1.0).sum() == 2
+    outside = rounded(Section(SQUARE), 0.1, outside=True).outline
+    assert (outside[:, 0] == 0.0).sum() == 2
+    short = rounded(Section(SQUARE), 5.0, outside=False)  # no arc is larger than its edges
+    assert first_crossing(short.outline) is None
+    assert signed_area(short.outline) == pytest.approx(1.0 - 2.0 * (1.0 - np.pi / 4.0) * 0.45**2, rel=1e-3)
+
+
 # -- meshes -----------------------------------------------------------------------------------------------------------
 
 
@@ -140,7 +153,7 @@ def test_half_the_edge_has_two_to_four_times_the_elements():
 
 def test_the_cap_is_made_of_whole_elements():
     model = oring_model(seal('capped_ring'))
-    moduli = np.ravel(model.rubber.elastic_modulus)
+    moduli = np.ravel(model.rubber.modulus)
     assert set(moduli) == {5.5e6, 500e6}
     volume = model.elements.weights.sum(axis=1)[moduli == 500e6].sum()
     section = placed(mirrored(SHAPES['capped_ring']()), RING.ring_inner_diameter, RING.section_diameter)
@@ -158,7 +171,7 @@ def test_a_circle_drawn_as_a_polygon_has_the_contact_of_the_o_ring():
     assert drawn.gland.peak_stress == pytest.approx(round_ring.gland.peak_stress, rel=0.03)
 
 
-@pytest.mark.parametrize('shape', SHAPES)
+@pytest.mark.parametrize('shape', [shape for shape in SHAPES if shape != 'wiper'])  # which holds no pressure
 def test_axial_force_is_pressure_times_area_and_forces_balance(shape: str):
     case = seal(shape)
     result = at(case, 7e5)
@@ -196,12 +209,27 @@ def test_a_cap_carries_more_contact_stress_the_stiffer_its_energiser():
     assert 1.5 < hard.gland.force / soft.gland.force < 2.1
 
 
+def test_a_mounted_seal_presses_less_as_its_rubber_relaxes_and_the_fluid_presses_on():
+    case = seal('x_ring')
+    relaxed = dataclasses.replace(case.rubber, prony_shares=(0.5,), prony_times=(60.0,), time_since_mounting=86400.0)
+    fresh, old = (tuple(oring_results(dataclasses.replace(case, rubber=r), (0.0, 2e6))) for r in (case.rubber, relaxed))
+    assert old[0].gland.force == pytest.approx(0.5 * fresh[0].gland.force, rel=2e-3)  # the squeeze alone
+    assert old[0].gland.peak_stress == pytest.approx(0.5 * fresh[0].gland.peak_stress, rel=2e-3)
+    assert old[1].gland.force > 0.8 * fresh[1].gland.force  # the pressure
+
+
 def test_fluid_passes_a_lip_whose_stress_is_below_its_pressure():
     stress = np.array([-1.0, 2.0, 3.0, 2.0, -1.0, -1.0, 4.0, 6.0, 4.0, -1.0])
     assert _holding(stress, 1.0, 0, 1) == 2
     assert _holding(stress, 5.0, 0, 1) == 7
     assert _holding(stress, 9.0, 0, 1) == 7  # none holds: the highest one
     assert _holding(stress, 1.0, 9, -1) == 7
+
+
+def test_a_lip_that_all_but_holds_the_next_one_too_keeps_the_fluid_before_it():
+    stress = np.array([-1.0, 9.3, 8.3, 8.4, 12.0, -1.0])
+    assert _holding(stress, 8.9, 0, 1) == 1
+    assert _holding(stress, 10.0, 0, 1) == 4
 
 
 def test_a_section_that_folds_onto_itself_is_refused():
@@ -245,6 +273,31 @@ def block(cap: np.ndarray | None = None) -> OringCase:
     )
 
 
+def test_the_edge_at_a_rounded_corner_is_as_strong_as_that_of_a_quarter_plane_with_a_notch():
+    r"""A quarter plane under a pressure q, its corner of a radius R, is by symmetry a half plane with a notch.
+
+    The open notch has the stress intensity 1.1215 q (pi R)^0.5. It closes from its tip on over a length d on which the
+    gap is a parabola: d^1.5 = 1.5 (pi R / E*) 1.1215 q (R / 2)^0.5, and the edge has k = 2 E* d^0.5 / (pi R).
+    """
+    height, radius, squeeze = 2e-3, 0.08e-3, 0.02
+    case, corners = block(), np.array([(0.0, 1.5), (0.0, -1.5), (2.0, -1.5), (2.0, 1.5)])
+    inner = case.geometry.rod_diameter
+    gap = {'ring_inner_diameter': inner - squeeze * height, 'gland_diameter': inner + 2.0 * (1.0 - squeeze) * height}
+    case = dataclasses.replace(
+        case,
+        section=rounded(Section(checked_outline(corners, 'block')), 2.0 * radius / height, outside=False),
+        geometry=dataclasses.replace(case.geometry, **gap),
+        numerics=OringNumerics(lines=17, transition=0.002, penalty=2e4),
+    )
+    result = at(case, 0.0)
+    q, modulus = middle_stress(result), 8e6
+    closed = (1.5 * math.pi * radius / modulus * 1.1215 * q * math.sqrt(radius / 2.0)) ** (2.0 / 3.0)
+    expected = 2.0 * modulus * math.sqrt(closed) / (math.pi * radius)
+    strengths = edge_strengths(result.rod, 0.0, 0.002 * 6e6)
+    assert strengths is not None
+    assert strengths[0] == pytest.approx([expected, expected], rel=0.05)
+
+
 def middle_stress(result: OringResult) -> float:
     """Contact stress in the middle half of the contact on the rod [Pa]."""
     place, stress = result.rod.position, result.rod.stress
@@ -275,3 +328,16 @@ def test_a_cap_and_its_energiser_share_the_squeeze_as_two_springs():
     series = stress(6e6, float(np.interp(1.8, [squeezed(s) for s in stretches], stretches)))
     together = stress(0.55 * 6e6 + 0.45 * 60e6, 0.9)
     assert series < middle_stress(at(block(cap), 0.0)) < together
+
+
+def test_a_cap_with_rounded_corners_has_a_film_of_each_direction_on_any_mesh():
+    films = []
+    for lines in (17, 25):
+        case = seal('capped_ring', lines, transition=0.005)
+        assert case.section is not None
+        case = dataclasses.replace(case, section=rounded(case.section, 0.02, outside=True))
+        result = at(case, 5e6)
+        film = seal_film(result.gland, 5e6, (4.0 / 3.0 * 500e6, 0.005 * 5.5e6), (0.03, 0.1))
+        assert film is not None
+        films.append(film[:2])
+    assert films[0] == pytest.approx(films[1], rel=0.1)

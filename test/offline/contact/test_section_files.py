@@ -1,13 +1,15 @@
 """Drawings of sections, CSV and DXF, and tension tests."""
 
+import zipfile
 from pathlib import Path
 
 import ezdxf
 import numpy as np
 import pytest
 
+from seal_friction_ros.core.lubrication.lubrication_case import parse_lubrication_case
 from seal_friction_ros.core.oring_contact.section import SHAPES, placed, signed_area
-from seal_friction_ros.offline.contact.section_files import read_outline, read_tension, with_files
+from seal_friction_ros.offline.contact.section_files import read_heights, read_outline, read_tension, with_files
 
 SQUARE = ((10.0, 0.0), (12.0, 0.0), (12.0, 3.0), (10.0, 3.0))  # r, z
 
@@ -120,3 +122,62 @@ def test_a_case_names_its_drawing_and_test(tmp_path: Path):
     assert found['rubber']['bulk_modulus'] == 1e9
     assert document['section'] == {'file': 'x.csv'}
     assert read_tension(tmp_path / 't.csv', 'mooney').mooney_ratio == pytest.approx(0.0, abs=1e-6)
+
+
+# -- measured surfaces ------------------------------------------------------------------------------------------------
+
+
+def x3p(path: Path, heights: np.ndarray, kind: str = 'F', increment: float = 1.0) -> Path:
+    """Map at steps of 2 um along and 3 um across, as ISO 25178-72 has it."""
+    rows, columns = heights.shape
+    axes = ''.join(
+        f'<{name}><AxisType>I</AxisType><DataType>{of}</DataType><Increment>{step}</Increment></{name}>'
+        for name, of, step in (('CX', 'D', 2e-6), ('CY', 'D', 3e-6), ('CZ', kind, increment))
+    )
+    size = f'<SizeX>{columns}</SizeX><SizeY>{rows}</SizeY><SizeZ>1</SizeZ>'
+    link = '<DataLink><PointDataLink>bindata/data.bin</PointDataLink></DataLink>'
+    with zipfile.ZipFile(path, 'w') as archive:
+        archive.writestr('main.xml', f'<p:ISO5436_2 xmlns:p="x"><Record1>{axes}</Record1>{size}{link}</p:ISO5436_2>')
+        archive.writestr('bindata/data.bin', heights.astype({'F': '<f4', 'I': '<i2', 'V': '<f8'}[kind]).tobytes())
+    return path
+
+
+def test_heights_of_an_x3p_are_metres_whether_stored_as_numbers_or_counts(tmp_path: Path):
+    heights = 1e-6 * np.arange(12.0).reshape(3, 4)
+    for kind, size in (('F', 1.0), ('I', 1e-6)):
+        found, steps = read_heights(x3p(tmp_path / f'{kind}.x3p', heights / size, kind, size))
+        assert found == pytest.approx(heights)
+        assert steps == (3e-6, 2e-6)
+
+
+def test_a_case_takes_the_roughness_of_its_measured_surfaces(tmp_path: Path):
+    random = np.random.default_rng(3)
+    rod = np.convolve(random.normal(size=4000), np.ones(5) / 5.0, 'same')
+    csv(tmp_path / 'rod.csv', 'x [mm], z [um]', tuple((2e-3 * i, 0.4 * z) for i, z in enumerate(rod)))
+    x3p(tmp_path / 'seal.x3p', 2e-6 * random.normal(size=(80, 200)))
+    case = {'name': 'mine', 'topography': {'wall': 'rod.csv', 'seal': 'seal.x3p', 'filling': True}}
+    found = parse_lubrication_case(with_files(case, tmp_path)).topography
+    assert found.rms_height == pytest.approx(np.hypot(0.4e-6 * rod.std(), 2e-6), rel=0.03)
+    assert found.wall_share == pytest.approx(0.4**2 / 5.0 / (0.4**2 / 5.0 + 4.0), rel=0.1)
+    assert found.filling
+
+
+@pytest.mark.parametrize(
+    ('name', 'content', 'reason'),
+    [
+        ('a.x3p', b'no archive', 'not an X3P archive'),
+        ('a.csv', b'x [mm],z [um]\n0,1\n1,2\n5,3\n', 'steps of x are not even'),
+        ('a.csv', b'x [mm],z [bar]\n0,1\n', 'is none of a length'),
+        ('a.sur', b'', 'not one of the surfaces that can be read, .csv, .x3p'),
+    ],
+)
+def test_a_file_that_is_no_surface_is_refused_in_one_line(tmp_path: Path, name: str, content: bytes, reason: str):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(ValueError, match=reason) as caught:
+        with_files({'topography': {'wall': name}}, tmp_path)
+    assert str(tmp_path / name) in str(caught.value)
+
+
+def test_an_x3p_whose_data_do_not_fit_its_head_is_refused(tmp_path: Path):
+    with pytest.raises(ValueError, match='are not 4 x 3 heights of type V'):
+        read_heights(x3p(tmp_path / 'v.x3p', np.zeros((3, 4)), 'V'))

@@ -60,6 +60,7 @@ def test_a_drawing_becomes_a_seal_file_that_meets_its_reading(tmp_path: Path, ca
 
 def test_a_seal_that_ends_at_a_corner_says_so_instead_of_a_film(capsys: pytest.CaptureFixture[str]):
     walls = ['--height', '5.7mm', '--rod', '36mm', '--gland', '46mm', '--hardness', '93', '--lines', '13']
+    walls += ['--corner-radius', '0']
     assert main(['section', 'u_cup', *walls, '--pressure', '50bar', '--film', '0.03,0.1']) == 0
     assert 'film of a smooth seal: unknown, a lip ends at a corner' in capsys.readouterr().out
 
@@ -99,6 +100,26 @@ def test_a_seal_that_does_not_fit_its_gland_is_refused_before_anything_is_comput
 def test_what_is_neither_shape_nor_file_is_refused(capsys: pytest.CaptureFixture[str]):
     assert main(['section', 'v_ring', *WALLS, '--pressure', '1bar']) == 2
     assert "'v_ring' is neither a file (.csv, .dxf) nor one of circle, x_ring" in capsys.readouterr().err
+
+
+def test_a_wiper_has_one_friction_and_holds_no_pressure(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    command = ['section', 'wiper', '--height', '5.5mm', '--rod', '36mm', '--gland', '46mm', '--lines', '13']
+    assert main([*command, '--pressure', '5bar']) == 2
+    assert 'a wiper holds no pressure: give a pressure of 0 alone' in capsys.readouterr().err
+    out = tmp_path / 'wiper.yaml'
+    assert main([*command, '--pressure', '0', '--out', str(out), '--json']) == 0
+    numbers = json.loads(capsys.readouterr().out)
+    law = parse_seal(read_yaml(out)).coulomb_law
+    assert law.coulomb_friction(0.0) == law.coulomb_friction(1e5) == pytest.approx(numbers['friction_N'][0], rel=1e-6)
+    assert numbers['normal_force_N'][0] > 0.0
+    assert {'normal force', 'peak stress', 'contact width'} <= {*numbers['mesh']['change']}
+
+
+@pytest.mark.parametrize('radius', ['1mm', '1um'])
+def test_a_corner_radius_that_is_not_computed_is_refused(radius: str, capsys: pytest.CaptureFixture[str]):
+    walls = ['--height', '5.7mm', '--rod', '36mm', '--gland', '46mm', f'--corner-radius={radius}']
+    assert main(['section', 'u_cup', *walls, '--pressure', '50bar']) == 2
+    assert 'of the height of the section: 0, or 0.005 to 0.04, can be computed' in capsys.readouterr().err
 
 
 def test_a_section_may_have_unknowns_and_its_samples_are_kept_by_its_outline(tmp_path: Path):
