@@ -56,10 +56,19 @@ class Machine(NamedTuple):
     """magnitude [N] over speed [m/s], pressure of chamber b and difference [bar], direction"""
     supplies: tuple[float, ...] = (40.0, 70.0, 110.0, 160.0)  # [bar]
     run_in: float = 0.0  # share of the friction that is lost over the first recording
+    noise: float = 1.0  # of the sensors, over the usual one
 
 
 def _two(rod: Callable, piston: Callable) -> Callable:
     return lambda v, b, d, _: rod(b) + piston(d) + 0.0 * v
+
+
+def _lip_seals(v: np.ndarray, b: np.ndarray, d: np.ndarray, _: np.ndarray) -> np.ndarray:
+    return 3.0 + 0.6 * b**1.3 + 1.1 * d**1.3 + 10.0 * v
+
+
+def _log_speed(v: np.ndarray, b: np.ndarray, d: np.ndarray, _: np.ndarray) -> np.ndarray:
+    return (100.0 + 0.8 * b + 1.4 * d) * (1.0 - 0.12 * np.log(np.maximum(v, 1e-3) / 0.02))
 
 
 PNEUMATIC = (2.0, 4.0, 6.0, 8.0)  # [bar]
@@ -72,6 +81,10 @@ MACHINES = (
     Machine('asymmetric', lambda v, b, d, s: (90.0 + 1.0 * b + 1.6 * d) * (1.0 + 0.15 * s) + 600.0 * v),
     Machine('run-in', lambda v, b, d, _: 90.0 + 1.0 * b + 1.6 * d + 600.0 * v, run_in=0.15),
     Machine('shear-thinning', lambda v, b, d, _: 100.0 + 0.7 * b + 1.2 * d + 500.0 * v**0.5),
+    Machine('log of the speed', _log_speed),
+    Machine('noisy', lambda v, b, d, _: 90.0 + 0.8 * b + 1.5 * d + 2000.0 * v, noise=4.0),
+    Machine('pneumatic lip seals', _lip_seals, PNEUMATIC),
+    Machine('pneumatic asymmetric', lambda v, b, d, s: (6 + 1.8 * b + 3 * d) * (1 + 0.12 * s) + 30 * v, PNEUMATIC),
     Machine('pneumatic linear', _two(lambda b: 4.0 + 1.5 * b, lambda d: 6.0 + 3.0 * d), PNEUMATIC),
     Machine(
         'pneumatic stribeck', lambda v, b, d, _: (8.0 + 1.2 * b + 2 * d) * (1 + 0.4 * np.exp(-v / 0.03)), PNEUMATIC
@@ -116,12 +129,12 @@ def record(machine: Machine, supplies: Sequence[float], speeds: Sequence[float],
     return Recording(np.arange(len(a)) * STEP, position, velocity, a, b, load, friction)
 
 
-def write_log(log: Recording, folder: Path, name: str, seed: int) -> list[str]:
+def write_log(log: Recording, folder: Path, name: str, seed: int, noise: float = 1.0) -> list[str]:
     """Log with the noise of its sensors, and rig file: arguments of ``identify``."""
     rng = np.random.default_rng(seed)
     span = float(np.max(log.a))
-    noisy = [p + 5e-4 * span * rng.normal(size=len(p)) for p in (log.a, log.b)]
-    load = log.load + 2e-3 * float(np.abs(log.load).max()) * rng.normal(size=len(log.load))
+    noisy = [p + 5e-4 * noise * span * rng.normal(size=len(p)) for p in (log.a, log.b)]
+    load = log.load + 2e-3 * noise * float(np.abs(log.load).max()) * rng.normal(size=len(log.load))
     position = np.round(1e3 * log.position / 5e-3) * 5e-3
     path, rig = folder / f'{name}.csv', folder / 'rig.yaml'
     columns = np.column_stack((log.time, position, *noisy, load))
@@ -169,7 +182,7 @@ def score(machine: Machine, kinds: Sequence[str], seed: int, folder: Path) -> Sc
     if machine.run_in:
         worn = 1.0 - 0.5 * machine.run_in
         second = second._replace(friction=second.friction * worn)
-    arguments = write_log(first, folder, 'first', seed)
+    arguments = write_log(first, folder, 'first', seed, machine.noise)
     moving = second.velocity != 0.0
     truth = second.friction[moving]
     size = float(np.sqrt(np.mean(truth**2)))

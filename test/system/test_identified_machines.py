@@ -6,7 +6,14 @@ from identified_machines import MACHINES, MOST, WAYS, score
 
 @pytest.mark.parametrize(
     'name',
-    ['asymmetric', pytest.param('run-in', marks=pytest.mark.long), pytest.param('viscous', marks=pytest.mark.long)],
+    [
+        'asymmetric',
+        'pneumatic lip seals',
+        *(
+            pytest.param(each, marks=pytest.mark.long)
+            for each in ('run-in', 'viscous', 'noisy', 'pneumatic asymmetric')
+        ),
+    ],
 )
 def test_the_friction_of_other_motions_is_as_good_as_by_least_squares(name, tmp_path):
     (machine,) = (each for each in MACHINES if each.name == name)

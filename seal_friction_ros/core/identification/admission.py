@@ -20,7 +20,7 @@ SAME_STAMP, OLD_STAMP, MALFORMED = 'same stamp', 'stamp not after the one before
 NOT_FINITE, BAD_INPUT = 'not finite', 'input old, out of range or jumping'
 FAULTS = (SAME_STAMP, OLD_STAMP, MALFORMED, NOT_FINITE, BAD_INPUT)
 """Reasons that are faults of the recording."""
-BEYOND_LOAD = 'averaged, or where no load is known'
+BEYOND_LOAD = 'where no load is known'
 NO_VELOCITY, NOT_STARTED = 'no velocity from it', 'before the first pressure and force sum'
 NO_REFERENCE = 'before the first reference'
 AT_REST, ACCELERATED = 'at rest', 'accelerated'

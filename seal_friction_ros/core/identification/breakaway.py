@@ -12,7 +12,7 @@ from scipy.optimize import nnls
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.identification.fitting import root_mean_square
 from seal_friction_ros.core.identification.readings import FrictionReadings
-from seal_friction_ros.core.identification.selection import WORTHWHILE, is_beaten
+from seal_friction_ros.core.identification.selection import is_beaten
 from seal_friction_ros.core.identification.validation import group_losses, jackknife_errors
 
 LAWS = {
@@ -25,6 +25,7 @@ LAWS = {
 }
 """Name -> whether the stiction has a constant part, a part proportional to the Coulomb friction, and one of each that
 grows with the logarithm of the dwell."""
+LESS_OFF = 0.1  # of the deviation where a law is worst: another that is less off there is taken (our choice)
 DWELL_VARIES = 3.0  # long over short dwell at one pressure from which the laws with it are tried (our choice)
 DWELL_UNIT = 1.0  # [s] in the logarithm (our choice)
 
@@ -65,7 +66,7 @@ def fit_breakaway(readings: FrictionReadings, friction: FloatArray, offsets: Flo
 
     Where the dwell was varied, each also with a part that grows by `dwell_growth`; stiction and ratio are then those at
     the dwell of its mean. Of the laws that none beats on readings left out, the simplest is taken, unless another is
-    less off by `WORTHWHILE` at the pressure where it is worst: the rod breaks away at one pressure at a time (our
+    less off by `LESS_OFF` at the pressure where it is worst: the rod breaks away at one pressure at a time (our
     choice).
 
     excess = stiction + ratio * f_c, all parts not negative, by least squares of the deviation over the breakaway force.
@@ -103,7 +104,7 @@ def fit_breakaway(readings: FrictionReadings, friction: FloatArray, offsets: Flo
 
     chosen = not_beaten[0]
     for name in not_beaten[1:]:
-        if worst(name) < (1.0 - WORTHWHILE) * worst(chosen):
+        if worst(name) < (1.0 - LESS_OFF) * worst(chosen):
             chosen = name
     decades = float(growth.mean())
     at_dwell = np.array([[1.0, 0.0, decades, 0.0], [0.0, 1.0, 0.0, decades]])  # parts -> stiction and ratio there

@@ -15,6 +15,7 @@ Source: maximum a posteriori with the covariance of Laplace, [Gelman2013]_ chapt
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -34,6 +35,8 @@ ASYMMETRY_PRIOR = (0.0, 0.08, -0.9, 0.9)  # [-]
 AREA_PRIOR = (0.0, 5.0, -100.0, 100.0)  # [-] share at the highest pressure of the chamber
 OFFSET_PRIOR = (0.0, 1e3, -1e9, 1e9)  # [-] share
 NOT_TOLD = (0.0, 1e-6, -1e-5, 1e-5)  # of a term that readings do not tell: it stays 0
+OPTIONAL = ('stribeck', 'asymmetry', 'areas')  # terms of `Told` that stay out unless they are more probable
+LOG_ODDS = math.log(2.0)  # [-] of an optional term to be absent, before the readings are seen (our choice)
 CLUSTER_PRIOR = 0.03  # [-] standard deviation of the friction between clusters, expected
 CLUSTER_FREEDOM = 1.0  # with this weight
 NOTHING = 1e-6  # [-] share that counts as 0
@@ -290,12 +293,15 @@ def _clusters(readings: FrictionReadings) -> IntArray:
     return numbered(readings.source, readings.level)
 
 
-def _weights(readings: FrictionReadings, residual: FloatArray, size: float, fitted: float) -> tuple[FloatArray, float]:
+def _weights(
+    readings: FrictionReadings, residual: FloatArray, size: float, fitted: float, least: float = 0.0
+) -> tuple[FloatArray, float]:
     """Weight of each reading [1/N], and the scatter of one more reading or stroke [-].
 
     ``residual`` is that of the magnitudes [N], shape (n,), after a fit of ``fitted`` effective parameters. The variance
     of a reading is that within a cluster, and as many times that between clusters as the cluster has readings. The
-    latter is the geometric mean of that found, with its degrees of freedom, and of the prior (our choice).
+    latter is the geometric mean of that found, with its degrees of freedom, and of the prior (our choice), but at
+    ``least`` that standard deviation.
     """
     cluster = _clusters(readings)
     share = residual / np.maximum(readings.scale, 1e-3 * size)
@@ -303,16 +309,17 @@ def _weights(readings: FrictionReadings, residual: FloatArray, size: float, fitt
     mean = np.bincount(cluster, share) / count
     within = float(np.sum((share - mean[cluster]) ** 2)) / max(len(share) - len(count), 1)
     freedom = max(len(count) - fitted, 0.0)
-    found = float(np.sum(np.maximum(mean**2 - within / count, 0.0))) / max(freedom, 1.0)
+    found = max(float(np.sum(mean**2 - within / count)), 0.0) / max(freedom, 1.0)
     of_prior = CLUSTER_FREEDOM / (CLUSTER_FREEDOM + freedom)
     between = max(found, 1e-8) ** (1.0 - of_prior) * CLUSTER_PRIOR ** (2.0 * of_prior)
+    between = max(between, least**2)
     variance = within + count[cluster] * between
     scatter = math.sqrt(within / (float(count.mean()) if readings.are_samples else 1.0) + between)
     return np.asarray(1.0 / (np.maximum(readings.scale, 1e-3 * size) * np.sqrt(variance))), scatter
 
 
 def fit_model(readings: FrictionReadings, columns: Sequence[Columns], told: Told) -> ModelFit:
-    """Most probable parameters and their covariance, with Stribeck friction and asymmetry where they are more probable.
+    """Most probable parameters and their covariance, with those of the `OPTIONAL` terms that are more probable.
 
     The ``columns`` of the pressures are the seals of each kind; none for a friction without pressure. Terms that are
     not ``told`` are 0.
@@ -328,13 +335,12 @@ def fit_model(readings: FrictionReadings, columns: Sequence[Columns], told: Told
         residual = readings.at.direction * (readings.force - free) - fit.friction(readings.at)
         fitted = len(vector) - float(np.sum(np.diag(fit.covariance) / problem.prior[:, 1] ** 2))
         weight, scatter = _weights(readings, residual, problem.size, fitted)
-    choices = [
-        _problem(readings, columns, told._replace(stribeck=falling, asymmetry=uneven))
-        for falling in sorted({told.stribeck, False})
-        for uneven in sorted({told.asymmetry, False})
-    ]
-    found = [(each, *_solved(each, weight, vector)) for each in choices]
-    problem, vector, jacobian, left = max(found, key=lambda one: _evidence(*one))
+    unsure = _weights(readings, residual, problem.size, fitted, CLUSTER_PRIOR * told.areas)[0]
+    optional = [sorted({getattr(told, name), False}) for name in OPTIONAL]
+    choices = [told._replace(**dict(zip(OPTIONAL, one, strict=True))) for one in product(*optional)]
+    odds = [_log_odds(_problem(readings, columns, one), unsure, vector) - LOG_ODDS * sum(one[1:]) for one in choices]
+    problem = _problem(readings, columns, choices[int(np.argmax(odds))])
+    vector, jacobian, left = _solved(problem, weight, vector)
     return _model_fit(problem, vector, jacobian, left, scatter)
 
 
@@ -372,8 +378,9 @@ def left_out(fit: ModelFit, readings: FrictionReadings) -> tuple[FloatArray, Flo
     return predicted, signed, np.array(vectors)
 
 
-def _evidence(problem: Problem, _: FloatArray, jacobian: FloatArray, left: FloatArray) -> float:
+def _log_odds(problem: Problem, weight: FloatArray, start: FloatArray) -> float:
     """Logarithm of the probability of the readings by the method of Laplace, but for a constant."""
+    _, jacobian, left = _solved(problem, weight, start)
     determinant = float(np.linalg.slogdet(jacobian.T @ jacobian)[1])
     return -0.5 * float(left @ left) - 0.5 * determinant - float(np.log(problem.prior[:, 1]).sum())
 

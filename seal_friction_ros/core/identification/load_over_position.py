@@ -35,11 +35,8 @@ from seal_friction_ros.core.identification.signal_preparation import (
 from seal_friction_ros.core.identification.validation import jackknife_errors
 
 MEAN_OVER = 0.2  # [s] samples are averaged over this time before the fit (our choice)
-LONGEST_MEAN = 1.0  # [s] of the friction that is left (our choice)
-WANTED_NOISE = 0.05  # of the friction, in that mean (our choice)
-FEWEST_STROKES = 2  # in each direction: each is predicted from the others
 SHORTEST_STROKE = 0.05  # of the travel; a shorter motion is part of no stroke (our choice)
-MOST_GROUPS = 20  # of strokes, each left out in turn (our choice)
+MOST_GROUPS = 20  # pairs of strokes, or parts of the way, each left out in turn (our choice)
 CELLS = 25  # of the travel, in which the directions are compared (our choice)
 LOADED = 2.0  # times the friction: a load that is told without being named (our choice)
 SMALLEST_SHARE = 0.5  # of the travel that both directions must share (our choice)
@@ -160,14 +157,12 @@ def without_load(signals: Signals, position: FloatArray, load: LoadOverPosition,
     """Signals whose force sum is without load and inertia: what is left while the rod slides is friction.
 
     Samples beyond the positions of the load are left out. While the rod moves, velocity, pressures and the force that
-    is left are centred means over `averaging_window` within one motion, and one sample is kept in a quarter of
-    `MEAN_OVER`: the noise of two pressures times their areas is often as large as the friction (our choice).
+    is left are centred means over `MEAN_OVER` within one motion: the noise of two pressures times their areas is
+    often as large as the friction (our choice).
     """
     inertia = inertia_at(load, position, signals.velocity, np.gradient(signals.velocity, signals.time))
     force = signals.force_sum - load_at(load, position) - inertia
     cleaned = Signals(signals.time, *(column.copy() for column in (*signals[1:4], force)))
-    kept: BoolArray = np.logical_or(np.isfinite(load_at(load, position)), ~np.isfinite(position))
-    window = averaging_window(load)
     usable: BoolArray = np.logical_and.reduce([np.isfinite(column) for column in cleaned])
     for direction, run in motions(signals, sliding):
         inside = run[usable[run]]
@@ -176,15 +171,8 @@ def without_load(signals: Signals, position: FloatArray, load: LoadOverPosition,
         step = float(np.median(np.diff(signals.time[inside])))
         for part in np.split(inside, np.flatnonzero(np.diff(inside) > 1) + 1):
             for column in cleaned[1:]:
-                column[part] = _centred_mean(column[part], max(round(window / 2.0 / step), 1))
-            kept[part] = kept[part] & (np.arange(len(part)) % max(round(MEAN_OVER / 4.0 / step), 1) == 0)
-    return cleaned.taken(kept)
-
-
-def averaging_window(load: LoadOverPosition) -> float:
-    """Time [s] over which the mean noise is `WANTED_NOISE` of the friction; from `MEAN_OVER` to `LONGEST_MEAN`."""
-    wanted = WANTED_NOISE * max(load.friction.mean, 1e-12)
-    return min(MEAN_OVER * max((load.noise / wanted) ** 2, 1.0), LONGEST_MEAN)
+                column[part] = _centred_mean(column[part], max(round(MEAN_OVER / 2.0 / step), 1))
+    return cleaned.taken(np.isfinite(load_at(load, position)) | ~np.isfinite(position))
 
 
 def known_acceleration(load: LoadOverPosition) -> float:
@@ -232,10 +220,10 @@ def _strokes(signals: Signals, position: FloatArray, sliding: Sliding) -> _Motio
             joined.append((side, [run]))
     long = [(s, runs) for s, runs in joined if np.ptp(position[np.concatenate(runs)]) > SHORTEST_STROKE * travel]
     counts = [sum(side == s for side, _ in long) for s in (1, -1)]
-    if min(counts) < FEWEST_STROKES:
+    if not all(counts):
         raise ValueError(
-            f'{counts[0]} strokes out and {counts[1]} back are too few to tell a load that follows position from '
-            'friction: drive the same way out and back three times at least, at two speeds'
+            f'{counts[0]} strokes out and {counts[1]} back do not tell a load that follows position from friction: '
+            'drive the same way out and back, better three times, at two speeds'
         )
     flat = [(number, side, run) for number, (side, runs) in enumerate(long) for run in runs]
     return _Motion(
@@ -269,7 +257,7 @@ class _Means(NamedTuple):
     counts: FloatArray  # samples of each row, shape (rows,)
     stroke: IntArray  # shape (rows,)
     direction: FloatArray  # shape (rows,)
-    group: IntArray  # strokes out and back are left out together, shape (rows,)
+    group: IntArray  # strokes out and back are left out together, of one pair parts of the way, shape (rows,)
     position: FloatArray  # [m] of the samples, shape (samples,)
     acceleration: FloatArray  # [m/s2] shape (rows,)
     speed: FloatArray  # [m/s] shape (rows,)
@@ -307,6 +295,9 @@ def _means(signals: Signals, position: FloatArray, motion: _Motion, low: float, 
     number = np.unique(stroke, return_inverse=True)[1]
     pairs = max((int(number.max()) + 1) // 2, 1)
     group = np.minimum(number // 2, pairs - 1) * min(pairs, MOST_GROUPS) // pairs
+    if pairs == 1:
+        place = np.add.reduceat(position[index], np.array(starts)) / count
+        group = np.minimum((place - low) / (high - low) * MOST_GROUPS, MOST_GROUPS - 1).astype(np.int64)
     empty = np.empty(0)
     means = _Means(
         np.array(starts), count.astype(np.float64), number, direction.astype(np.float64), group,

@@ -23,7 +23,6 @@ from seal_friction_ros.core.identification.signal_preparation import (
     clipped_share,
     even_sliding,
     half_range,
-    is_ambient,
     longest_stretch,
 )
 from seal_friction_ros.core.identification.what_a_log_tells import FreeRod
@@ -214,6 +213,22 @@ class FrictionReadings:
         of_levels = np.maximum(np.abs(self.half_ranges[0]), 1e-12)
         return np.asarray(of_levels[np.searchsorted(list(self.levels), self.level)])
 
+    def noise(self, rest: FloatArray) -> FloatArray:
+        r"""Standard deviation by the noise of the sensors [N] of each reading, shape (n,); 0 where it is not known.
+
+        Noise differs from sample to sample, friction does not: :math:`s^2 = \overline{(x_{i+1} - x_i)^2} / 2` of
+        samples [vonNeumann1941]_, and :math:`\pi s^2 / 2 n` of the median of n. ``rest`` is the force without friction
+        [N], shape (n,).
+        """
+        if self.are_samples:
+            one_motion = (np.diff(self.at.direction) == 0.0) & (np.diff(self.source) == 0)
+            return np.full(self.count, math.sqrt(0.5 * float(np.mean(np.diff(rest)[one_motion] ** 2))))
+        if not self.samples:
+            return np.zeros(self.count)
+        return np.array(
+            [math.sqrt(0.25 * math.pi * float(np.mean(np.diff(one) ** 2)) / len(one)) for one in self.samples]
+        )
+
     @cached_property
     def two_sided(self) -> tuple[IntArray, ...]:
         """Indices of the readings of each source; empty for a source in one direction only."""
@@ -309,10 +324,9 @@ def check_log(log: RecordedLog) -> None:
 def check_clipping(name: str, what: str, column: FloatArray, *, is_pressure: bool = False) -> None:
     """Check the signal ``what`` of the source ``name``: samples while the rod moves, shape (n,); a pressure in Pa.
 
-    A pressure may stand at that of the air: a vented chamber does. ValueError: the sensor is clipped.
+    A pressure may stand at its lowest, as in a vented chamber. ValueError: the sensor is clipped.
     """
-    low_is_real = is_pressure and is_ambient(float(np.nanmin(column, initial=np.inf)))  # a vented chamber
-    share = clipped_share(column, low_is_real=low_is_real)
+    share = clipped_share(column, low_is_real=is_pressure)
     if share:
         ends = f'{float(np.nanmin(column)):.6g} or {float(np.nanmax(column)):.6g}'
         raise ValueError(

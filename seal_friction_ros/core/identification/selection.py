@@ -15,6 +15,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
+from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.identification.candidate_laws import (
     CandidateLaw,
     Variation,
@@ -27,11 +28,9 @@ from seal_friction_ros.core.identification.readings import FrictionReadings, are
 from seal_friction_ros.core.identification.validation import CrossValidation, Ticks, cross_validate, predict
 
 BEATEN_CONFIDENCE = 0.95  # of the test whether a law is beaten (our choice)
-WORTHWHILE = 0.1  # share of its loss by which a law must be beaten (our choice)
-BETTER = 0.05  # share of its loss by which all terms with a prior are better than the best law (our choice)
 NEAR = 2.0  # a sound law is near if its loss is at most as many times that of the best (our choice)
 RISES = 2.0  # standard errors of the rise over the pressures from which friction rises (our choice)
-SPEEDS_DIFFER = 1.5  # fastest over slowest reading at one pressure, above which velocity terms are tried (our choice)
+SPEEDS_DIFFER = 1.5  # two speeds at one pressure, above which velocity terms are tried (our choice)
 FEWEST_PRESSURES_FOR_EXPONENT = 6  # with fewer, leaving each out in turn does not determine an exponent (our choice)
 STRATA = 3  # quantiles of speed and of pressure, whose cells of a swept log are left out in turn (our choice)
 
@@ -39,24 +38,32 @@ STRATA = 3  # quantiles of speed and of pressure, whose cells of a swept log are
 def variation_of(readings: FrictionReadings) -> Variation:
     """What the readings vary.
 
-    Speeds count where they differ at one pressure in one direction: speeds that follow pressure or direction tell
-    nothing apart. One direction has no asymmetry, and if each source holds one pressure, asymmetry is its offset.
+    Speeds count where they differ by `SPEEDS_DIFFER` beyond what pressures and direction explain: speeds that follow
+    these tell nothing apart. One direction has no asymmetry, and if each source holds one pressure, asymmetry is its
+    offset.
     """
-    speed = np.abs(readings.at.velocity)
-    faster = []
-    for inside in readings.levels.values():
-        for side in (-1.0, 1.0):
-            of_side = speed[inside & (readings.at.direction == side)]
-            if len(of_side) > 1:
-                faster.append(bool(of_side.max() > SPEEDS_DIFFER * of_side.min()))
     several = [len(np.unique(readings.level[readings.source == source])) > 1 for source in np.unique(readings.source)]
-    levels = len(readings.levels)
     return Variation(
         pressures=_pressures(readings),
-        speeds=bool(np.isfinite(speed).all()) and float(np.mean(faster or [False])) > 0.5,
+        speeds=_has_speeds(readings),
         asymmetry=any(several) and all(len(index) for index in readings.two_sided),
-        exponent=readings.are_samples or levels >= FEWEST_PRESSURES_FOR_EXPONENT,
+        exponent=readings.are_samples or len(readings.levels) >= FEWEST_PRESSURES_FOR_EXPONENT,
     )
+
+
+def _has_speeds(readings: FrictionReadings) -> bool:
+    """Whether speeds differ; for strokes, whether pressures and direction leave them as uneven as two that differ."""
+    speed, side = np.abs(readings.at.velocity), readings.at.direction
+    if not np.isfinite(speed).all():
+        return False
+    if readings.are_samples:
+        low, high = np.quantile(speed, (0.05, 0.95))
+        return bool(high > SPEEDS_DIFFER * low)
+    causes = readings.at.pressure / BAR if readings.free_rod is None else np.empty((readings.count, 0))
+    even = np.column_stack((np.ones(readings.count), causes))
+    columns = np.column_stack((even, even * side[:, np.newaxis]))
+    rest = speed - columns @ np.linalg.lstsq(columns, speed, rcond=1e-9)[0]
+    return float(rest.std()) > (SPEEDS_DIFFER - 1.0) / (SPEEDS_DIFFER + 1.0) * float(speed.mean())
 
 
 def _pressures(readings: FrictionReadings) -> int:
@@ -201,7 +208,7 @@ def recommended(scores: Scores, *, rises: bool = False) -> LawScore:
         left = sound
     best = min(left, key=_mean_loss)
     if best.law.has_prior and all(
-        best.mean_loss < (1.0 - BETTER) * other.mean_loss for other in left if other is not best
+        best.mean_loss < (1.0 - worthwhile(best.losses)) * other.mean_loss for other in left if other is not best
     ):
         return best
     left = [score for score in left if not score.law.has_prior] or left
@@ -215,17 +222,22 @@ def _mean_loss(score: LawScore) -> float:
     return score.mean_loss
 
 
+def worthwhile(losses: FloatArray) -> float:
+    """Share of the loss that is worth a term [-]: one that tells nothing changes the square of n losses by 1/n."""
+    return 0.5 / len(losses)
+
+
 def is_beaten(losses: FloatArray, others: FloatArray) -> bool:
     """Whether the losses of another law are lower beyond the noise, and by enough to justify a term.
 
-    Beyond the noise: by a one-sided paired t-test at `BEATEN_CONFIDENCE`. Enough: `WORTHWHILE` of the mean loss. Losses
-    are those of each group, shape (groups >= 2,).
+    Beyond the noise: by a one-sided paired t-test at `BEATEN_CONFIDENCE`. Enough: `worthwhile`. Losses are those of
+    each group, shape (groups >= 2,).
     """
     difference = losses - others
     groups = len(difference)
     error = float(difference.std(ddof=1)) / math.sqrt(groups)
     noise = float(stdtrit(groups - 1, BEATEN_CONFIDENCE)) * error
-    return float(difference.mean()) > max(noise, WORTHWHILE * float(losses.mean()))
+    return float(difference.mean()) > max(noise, worthwhile(losses) * float(losses.mean()))
 
 
 class ChosenAnew(NamedTuple):

@@ -17,14 +17,11 @@ LONGEST_GAP = 0.5  # [s] a longer pause in the log ends a stroke (our choice)
 SHORTEST_REST = 0.1  # [s] a shorter stop is no rest before a breakaway (our choice)
 FEWEST_SAMPLES = 10  # of a stroke, for its median (our choice)
 SPEED_TOLERANCE = 0.25  # of the median speed of a stroke: within it the speed is held (our choice)
-PRESSURE_TOLERANCE = 0.1  # of the highest pressure of a stroke: within it the pressure is held
-PRESSURE_NOISE = 2e4  # [Pa] a smaller change is noise at any pressure (our choice)
+PRESSURE_TOLERANCE = 0.1  # of the highest pressure of a stroke in either chamber: within it both are held
 HELD_SHARE = 0.5  # of the samples of a stroke that must be at held speed (our choice)
 LEVEL_GAP = 0.05  # of the pressure: a larger step between sorted pressures separates two levels (our choice)
 LEVEL_GAP_MIN = 1e4  # [Pa] smallest such step: near zero a regulator differs between the directions
 SAME_LEVEL = 0.2  # of the pressure: two directions of one log that differ less are one level (our choice)
-AMBIENT = 1.0e5  # [Pa] of the air, absolute
-AMBIENT_WIDTH = 1.2e4  # [Pa] from it, by weather, altitude and sensor (our choice)
 HELD_COUNTS = 5.0  # steps of the sensor: a signal that ranges no further is held, by whatever dithers (our choice)
 LEVEL_WIDTH = 0.1  # of the highest pressure: a wider level is a ramp and is divided into equal parts
 
@@ -187,8 +184,8 @@ def _is_held(signals: Signals, samples: IntArray) -> bool:
     median = float(np.median(speed))
     if np.mean(np.abs(speed - median) <= SPEED_TOLERANCE * median) < HELD_SHARE:
         return False
-    ranges = [np.quantile(column[samples], (0.05, 0.95)) for column in (signals.pressure_a, signals.pressure_b)]
-    return all(high - low <= max(PRESSURE_TOLERANCE * abs(high), PRESSURE_NOISE) for low, high in ranges)
+    ends = [np.quantile(column[samples], (0.05, 0.95)) for column in (signals.pressure_a, signals.pressure_b)]
+    return bool(np.ptp(ends, axis=1).max() <= PRESSURE_TOLERANCE * np.abs(ends).max())
 
 
 def breakaways(signals: Signals, sliding: Sliding) -> list[SignalReading]:
@@ -299,11 +296,6 @@ def longest_stretch(wrong: BoolArray) -> tuple[int, int]:
     first, last = edges[::2], edges[1::2]
     longest = int(np.argmax(last - first))
     return int(first[longest]), int(last[longest] - first[longest])
-
-
-def is_ambient(pressure: float) -> bool:
-    """Whether a pressure [Pa], gauge or absolute, is that of the air: where a vented chamber stands."""
-    return any(abs(pressure - ambient) < AMBIENT_WIDTH for ambient in (0.0, AMBIENT))
 
 
 def clipped_share(values: FloatArray, *, low_is_real: bool = False) -> float:

@@ -21,6 +21,8 @@ from seal_friction_ros.core.identification.friction_model import ModelFit
 from seal_friction_ros.core.identification.readings import FrictionReadings
 
 Ticks = Callable[[int], None]
+LAW_ERROR = 0.02  # [-] standard deviation of a law between the speeds and pressures of its readings (our choice),
+CURVED = 0.04  # [-] and of one whose readings are strokes: the few speeds of a test show no curve over the speed
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,18 +158,45 @@ def prediction_uncertainty(
     is measured - ``predicted`` friction [N], shape (n,).
     """
     friction = np.maximum(np.abs(predicted), 0.05 * float(np.abs(predicted).mean()))
-    raw = PredictionUncertainty(0.0, max(root_mean_square(deviation), 1e-12))
-    for _ in range(10):
-        variance = np.maximum(raw.std(friction) ** 2, 1e-24)
-        columns = np.column_stack((friction**2, np.ones_like(friction))) / variance[:, np.newaxis]
-        squares, _ = nnls(columns, deviation**2 / variance)
-        raw = PredictionUncertainty(*(math.sqrt(value) for value in squares))
+    raw = _two_parts(friction, deviation**2)
     std = np.maximum(raw.std(friction), 1e-12)
     n = len(deviation)
     rank = min(math.ceil(0.95 * (n + 1)), n)
     quantile = float(np.sort(np.abs(deviation) / std)[rank - 1]) / BAND_95
     size = quantile * math.sqrt(1.0 + 1.0 / groups)
     return PredictionUncertainty(math.hypot(raw.relative * size, in_addition), raw.absolute * size)
+
+
+def _two_parts(friction: FloatArray, squares: FloatArray) -> PredictionUncertainty:
+    """Uncertainty whose squares are nearest to ``squares`` [N^2] at a friction [N], shape (n,) each."""
+    found = PredictionUncertainty(0.0, max(math.sqrt(float(squares.mean())), 1e-12))
+    for _ in range(10):
+        variance = np.maximum(found.std(friction) ** 2, 1e-24)
+        columns = np.column_stack((friction**2, np.ones_like(friction))) / variance[:, np.newaxis]
+        found = PredictionUncertainty(*np.sqrt(nnls(columns, squares / variance)[0]).tolist())
+    return found
+
+
+def model_uncertainty(model: ModelFit, readings: FrictionReadings, in_addition: float) -> PredictionUncertainty:
+    r"""Standard deviation of the friction by a model with priors, which its readings were fitted by.
+
+    .. math:: \sigma^2 = g^T C\,g + (q\,F)^2\,(1 - \overline{n^2} / \overline{r^2})
+
+    with the covariance C of the posterior, and what the model misses: the quantile q that holds 95 % of the rest r of
+    the readings, over the mean friction F of their pressure, without the noise n of their sensors, which is none of the
+    friction. `LAW_ERROR` or `CURVED`, and ``in_addition``, as of `prediction_uncertainty`, are added in square. Our choice.
+    """
+    friction = model.friction(readings.at)
+    rest = readings.magnitudes(model.offsets) - friction
+    fitted = 0 if readings.are_samples else int(model.told.sum())
+    squares = float(np.mean(rest**2)) * readings.count / max(readings.count - fitted, 1)
+    noise = float(np.mean(readings.noise(readings.at.direction * rest) ** 2))
+    quantile = float(np.quantile(np.abs(rest) / readings.scale, 0.95)) / BAND_95
+    missed = quantile**2 * max(squares - noise, 0.0) / max(float(np.mean(rest**2)), 1e-24)
+    relative, absolute = _two_parts(friction, model.std(readings.at) ** 2 + missed * readings.scale**2)
+    return PredictionUncertainty(
+        math.hypot(relative, LAW_ERROR if readings.are_samples else CURVED, in_addition), absolute
+    )
 
 
 def deviations_in_std(

@@ -30,7 +30,6 @@ from seal_friction_ros.core.identification.friction_model import Told
 from seal_friction_ros.core.identification.prepare_readings import with_predictable_groups
 from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
 from seal_friction_ros.core.identification.selection import (
-    WORTHWHILE,
     ChosenAnew,
     LawScore,
     LeftOut,
@@ -41,6 +40,7 @@ from seal_friction_ros.core.identification.selection import (
     rises_over_pressures,
     score_ladder,
     variation_of,
+    worthwhile,
 )
 from seal_friction_ros.core.identification.temperature import at_reference, fit_temperature
 from seal_friction_ros.files import config_path, read_yaml
@@ -183,11 +183,13 @@ def _prepared(sources: Sources, kinds: tuple[SealKind, ...]) -> PreparedReadings
 
 
 def _correction(readings: FrictionReadings, has_fitted_load: bool) -> ForceCorrection | None:
+    """Error of the areas; None without a load cell, where the pressures alone are the force."""
+    if has_fitted_load:
+        return None
     if not readings.kinds:
         return force_correction(readings)
     variation = variation_of(readings)
-    speeds, asymmetry = variation.speeds, variation.asymmetry and not has_fitted_load
-    return seal_kinds.area_errors(readings, Told(speeds, speeds, asymmetry, areas=True))
+    return seal_kinds.area_errors(readings, Told(variation.speeds, variation.speeds, variation.asymmetry, areas=True))
 
 
 def _told_apart(data: IdentificationData, selection: LawSelection, largest_error: float) -> seal_kinds.ToldApart | None:
@@ -253,7 +255,7 @@ def select_law(
     if settled is not None and len(data.used.levels) >= FEWEST_TO_COMPARE:
         of_settled = _scored(settled.readings, data.ring, data.sources.has_fitted_load)
         best_settled = recommended(of_settled, rises=rises_over_pressures(settled.readings))
-        if best_settled.mean_loss <= (1.0 + WORTHWHILE) * best.mean_loss:
+        if best_settled.mean_loss <= (1.0 + worthwhile(best.losses)) * best.mean_loss:
             scores, best, (readings, share, _) = of_settled, best_settled, settled
         else:
             settled, is_no_run_in = None, True
@@ -343,14 +345,18 @@ def assess(
         between, of_band = between._replace(std=0.0), 0.0
     else:
         of_band = between.of_band
-    unseen = collinear_spread(selection.scores, found, used) if told is None else told.unseen_std
-    in_addition = math.hypot(of_band, unseen)
+    unseen = collinear_spread(selection.scores, found, used)
+    if found.model is None:
+        both = math.hypot(of_band, unseen)
+        uncertainty = validation.prediction_uncertainty(left_out.predicted, left_out.deviation, groups, both)
+    else:
+        uncertainty = validation.model_uncertainty(found.model, used, of_band)
     with progress('test the band', groups * (groups - 1)) as advance:
         coverage = validation.band_coverage(selection.law, selection.readings, found.values, advance)
     names = [parameter.name for parameter in selection.law.parameters]
     errors = validation.jackknife_errors(validation.table_of(left_out.values, names))
     return LawQuality(
-        uncertainty=validation.prediction_uncertainty(left_out.predicted, left_out.deviation, groups, in_addition),
+        uncertainty=uncertainty,
         between_runs=between,
         is_stated=run_to_run is not None,
         changes=diagnostics.shared_levels(everything) + diagnostics.swept_logs_compared(used, found),

@@ -81,7 +81,7 @@ def test_where_speed_follows_pressure_the_readings_leave_the_line(designed):
     assert sum(abs(p - v) > 0.3 for p, v in shares) >= len(shares) // 2
     assert all(0.0 <= p <= 1.0 and 0.0 < v <= 1.0 for p, v in shares)
     assert {*design.correlation.parameters} == PAIR
-    assert abs(design.correlation.before) > 0.9 > abs(design.correlation.after)
+    assert abs(design.correlation.before) > 0.85 > 2.0 * abs(design.correlation.after)
     assert design.limit == 'law'
 
 
@@ -100,7 +100,7 @@ def test_the_predicted_effect_is_that_of_simulated_readings_on_the_error_of_the_
         found.append([np.sqrt(np.mean((model_of(one).friction(at) / true - 1.0) ** 2)) for one in (readings, more)])
     predicted, found = (np.sqrt(np.mean(np.square(each), axis=0)) for each in (predicted, found))
     assert found == pytest.approx(predicted, rel=0.5)
-    assert found[1] / found[0] == pytest.approx(predicted[1] / predicted[0], rel=0.4)
+    assert found[1] / found[0] == pytest.approx(predicted[1] / predicted[0], rel=0.5)
     assert predicted[1] < 0.2 * predicted[0]
 
 

@@ -1,11 +1,14 @@
 """One model with a prior on every term: what data tell is found, and what they do not tell stays in the covariance."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
 from seal_friction_ros.core.identification.friction_model import Told, fit_model, left_out
 from seal_friction_ros.core.identification.readings import FrictionReadings
+from seal_friction_ros.core.identification.validation import model_uncertainty
 
 BAR = 1e5  # [Pa]
 ALL = Told(viscous=True, stribeck=True, asymmetry=True, areas=False)
@@ -62,3 +65,40 @@ def test_a_group_left_out_is_predicted_as_by_a_fit_to_the_others():
         others = fit_model(made.taken(~out), [(0,)], ALL)
         assert predicted[out] == pytest.approx(others.friction(made.taken(out).at), rel=0.02)
     assert np.abs(deviation).mean() == pytest.approx(0.02 * found.size, rel=0.6)
+
+
+def test_noise_of_the_samples_is_no_difference_between_strokes():
+    """Forty strokes of a swept log without any: the scatter of one more is that of the noise of its mean."""
+    rng = np.random.default_rng(2)
+    side = np.repeat(np.tile([1.0, -1.0], 20), 50)
+    pressure, speed = rng.uniform(5.0, 80.0, size=2000), rng.uniform(0.01, 0.1, size=2000)
+    force = side * (20.0 + 0.5 * pressure + 100.0 * speed) + 8.0 * rng.normal(size=2000)
+    at = OperatingConditions(pressure[:, np.newaxis] * BAR, side * speed, side)
+    group = np.arange(2000) // 200
+    made = FrictionReadings(at, force, np.zeros_like(group), group, group, ('log',), 'block', are_samples=True)
+    found = fit_model(made, [(0,)], ALL)
+    assert found.scatter < 1.2 * 8.0 / np.sqrt(50.0) / np.abs(force).mean()
+    # Nor is it any of the friction: the band is that of the law, with the spread between runs.
+    assert made.noise(force - side * found.friction(at)) == pytest.approx(np.full(2000, 8.0), rel=0.1)
+    friction = np.array([found.size])
+    assert 0.0 < model_uncertainty(found, made, 0.0).std(friction)[0] < 0.25 * 8.0
+    assert model_uncertainty(found, made, 0.3).std(friction)[0] == pytest.approx(0.3 * found.size, rel=0.02)
+
+
+def test_what_the_model_misses_is_in_the_band():
+    """Friction over the logarithm of the speed; without noise, the readings show what no term has."""
+    made = readings(lambda p, v, _: (20.0 + 0.5 * p) * (1.0 - 0.2 * np.log(v / 0.02)), noise=0.0)
+    found = fit_model(made, [(0,)], ALL)
+    off = np.abs(made.magnitudes(found.offsets) - found.friction(made.at))
+    std = model_uncertainty(found, made, 0.0).std(found.friction(made.at))
+    assert 0.9 <= np.mean(off < 1.96 * std) <= 1.0
+    assert std.mean() < 2.0 * np.sqrt(np.mean(off**2)) + found.std(made.at).mean()
+
+
+def test_noise_of_a_median_is_that_of_its_samples():
+    rng = np.random.default_rng(3)
+    samples = tuple(5.0 + 2.0 * rng.normal(size=(8, 400)))
+    made = readings(lambda p, *_: 20.0 + 0.0 * p, bars=(5,), speeds=(0.01, 0.02))
+    assert (made.noise(made.force) == 0.0).all()  # readings of a table
+    of_medians = np.sqrt(np.pi / 2.0 * 2.0**2 / 400.0)
+    assert replace(made, samples=samples).noise(made.force) == pytest.approx(np.full(8, of_medians), rel=0.1)

@@ -29,7 +29,6 @@ from seal_friction_ros.core.identification.load_over_position import (
     _speed_terms,
     _spline_knots,
     _strokes,
-    averaging_window,
     fit_load,
     follows_position,
     inertia_at,
@@ -143,13 +142,6 @@ def test_the_mass_of_the_boom_is_found_with_its_change_over_position():
     assert load.condition_number < 30.0
 
 
-def test_more_noise_makes_a_longer_mean():
-    run = boom.simulate(Boom(), 'both')
-    little, much = (fitted(boom.measured(run, 0, full_scale=full * BAR)) for full in (50, 250))
-    assert averaging_window(little) < averaging_window(much) <= 1.0
-    assert little.noise < much.noise
-
-
 def test_one_sine_gives_the_friction_and_warns_that_inertia_counts_as_load():
     run = boom.simulate(Boom(), 'one_sine')
     log = boom.measured(run, 0)
@@ -200,20 +192,13 @@ def told(noise=30.0, friction=40.0, mass_std=2.0):
     )
 
 
-@pytest.mark.parametrize(
-    ('noise', 'window'), [(1.0, 0.2), (2.0, 0.2), (3.0, 0.45), (4.0, 0.8), (4.5, 1.0), (400.0, 1.0)]
-)
-def test_a_mean_is_as_long_as_its_noise_is_a_twentieth_of_the_friction_within_0_2_to_1_s(noise, window):
-    assert averaging_window(told(noise)) == pytest.approx(window)
-
-
 def test_inertia_is_known_to_a_fiftieth_of_the_friction_up_to_some_acceleration():
     assert known_acceleration(told()) == pytest.approx(0.02 * 40.0 / 2.0)
     assert known_acceleration(told(mass_std=0.0)) == 0.0
 
 
 def test_where_there_is_no_load_the_means_of_a_motion_are_left_and_a_rest_as_it_was():
-    """Means over 0.2 s, one sample kept in 50 ms; a mean of a straight line is the line."""
+    """Means over 0.2 s; a mean of a straight line is the line."""
     time = np.arange(400) * 0.01
     velocity = np.where(time < 1.0, 0.0, 0.1)
     ramp = 5.0 * time
@@ -225,7 +210,7 @@ def test_where_there_is_no_load_the_means_of_a_motion_are_left_and_a_rest_as_it_
     resting, moving = left.time < 0.995, left.time >= 0.995
     assert np.count_nonzero(resting) == 100
     assert (left.force_sum[resting] == 3.0).all()
-    assert np.diff(left.time[moving]) == pytest.approx(np.full(np.count_nonzero(moving) - 1, 0.05))
+    assert np.diff(left.time[moving]) == pytest.approx(np.full(np.count_nonzero(moving) - 1, 0.01))
     assert left.pressure_a[moving] == pytest.approx(1e5 * 5.0 * left.time[moving])
     inside = (left.time > 1.7) & (left.time < 3.8)
     rest_of_noise = np.abs(left.force_sum - 5.0 * left.time)[inside]
@@ -277,9 +262,13 @@ def test_directions_at_different_positions_are_refused():
         fitted(log)
 
 
-def test_one_stroke_out_and_back_is_refused():
-    with pytest.raises(ValueError, match=r'1 strokes out and 1 back are too few.*three times'):
-        fitted(boom.measured(boom.simulate(Boom(), 'single'), 0))
+def test_one_stroke_out_and_back_tells_the_load():
+    simulated = boom.simulate(Boom(), 'single')
+    load = fitted(boom.measured(simulated, 0))
+    true = Boom().load(load.knots)
+    assert load.forces == pytest.approx(true, abs=0.05 * true.mean())
+    moving = np.abs(simulated.velocity) > 5e-3
+    assert load.friction.mean == pytest.approx(np.abs(simulated.friction[moving]).mean(), rel=0.03)
 
 
 def test_a_log_without_position_is_refused():
@@ -369,16 +358,9 @@ def test_one_sample_in_a_hundred_may_lack_its_position(missing, told):
         assert fit_load(signals, x, ('a',), SLIDING).strokes == 4
 
 
-@pytest.mark.parametrize(
-    ('parts', 'counts'),
-    [
-        ((*TO_AND_FRO, (0.1, 200)), '2 strokes out and 1 back'),
-        ((*TO_AND_FRO[2:], *TO_AND_FRO), '1 strokes out and 2 back'),
-    ],
-)
-def test_two_strokes_each_way_are_needed(parts, counts):
-    with pytest.raises(ValueError, match=f'^{counts} are too few'):
-        fit_load(*drive((0.0, 20), *parts), ('a',), SLIDING)
+def test_strokes_both_ways_are_needed():
+    with pytest.raises(ValueError, match=r'^1 strokes out and 0 back do not tell a load'):
+        fit_load(*drive((0.0, 20), (0.1, 200), (0.0, 20)), ('a',), SLIDING)
 
 
 def passed(out, back):
@@ -415,7 +397,7 @@ def test_a_row_is_a_mean_over_a_fifth_of_a_second_of_one_stroke():
     assert found.starts.tolist() == [0, 21, 41, 61, 81, 101, 122, 142, 162, 182]
     assert found.stroke.tolist() == [0] * 5 + [1] * 5
     assert found.direction.tolist() == [1.0] * 5 + [-1.0] * 5
-    assert found.group.tolist() == [0] * 10
+    assert found.group.tolist() == np.floor(20.0 * (found.of(x) + 1.0) / 2.0).tolist()  # one pair: parts of the way
     assert found.force[:2].tolist() == [10.0, 30.5]
     assert found.pressures[[0, -1]] == pytest.approx(
         np.array([[2e6, 0.0], [2e6, 3e5]])
@@ -452,7 +434,6 @@ def test_pairs_of_strokes_are_left_out_together_in_twenty_groups_at_most():
 
     assert groups(4) == [0, 0, 1, 1]
     assert groups(5) == [0, 0, 1, 1, 1]  # the last one has no partner
-    assert groups(1) == [0]
     assert groups(40) == [i // 2 for i in range(40)]
     assert groups(44) == [i // 2 * 20 // 22 for i in range(44)]
 
@@ -722,7 +703,7 @@ def test_what_is_left_without_load_and_inertia_is_the_friction():
     assert left.force_sum[slides] == pytest.approx(20.0 * np.sign(left.velocity[slides]))
     first = [run[0] for side, run in motions(signals, SLIDING) if side]
     assert {round(100.0 * t) for t in left.time[slides]} >= {int(i) for i in first}  # of each motion the first one
-    assert np.count_nonzero(slides) == pytest.approx(np.count_nonzero(moving) / 5.0, abs=2)
+    assert np.count_nonzero(slides) == pytest.approx(np.count_nonzero(moving), abs=2)
     # Beyond the knots nothing is left; where the position is lost, the sample stays, but without a force.
     away = np.where(np.arange(400) >= 300, 7.0, position)
     assert without_load(signals, away, load, SLIDING).time.max() < 3.0
@@ -731,14 +712,6 @@ def test_what_is_left_without_load_and_inertia_is_the_friction():
     kept = without_load(signals, lost, load, SLIDING)
     assert np.isnan(kept.force_sum[kept.time == 1.0]).all()
     assert np.isfinite(kept.force_sum[kept.time != 1.0]).all()
-
-
-@pytest.mark.parametrize(('step', 'every'), [(0.05, 1), (0.04, 1), (0.025, 2), (0.01, 5)])
-def test_of_a_motion_one_sample_is_kept_in_50_ms(step, every):
-    time = step * np.arange(100)
-    signals = Signals(time, np.full(100, 0.1), np.full(100, 2e6), np.full(100, 1e6), np.full(100, 20.0))
-    left = without_load(signals, np.full(100, 0.5), replace(told(0.1), mass=0.0), SLIDING)
-    assert left.time == pytest.approx(time[::every])
 
 
 def test_means_do_not_reach_across_a_lost_sample_or_a_reversal():
@@ -751,7 +724,7 @@ def test_means_do_not_reach_across_a_lost_sample_or_a_reversal():
     left = without_load(signals, np.full(200, 0.5), load, SLIDING)
     found = left.force_sum[np.isfinite(left.force_sum)]
     assert {round(value, 9) for value in found.tolist()} == {0.0, 8.0, -5.0}
-    assert [np.count_nonzero(np.isclose(found, value)) for value in (0.0, 8.0, -5.0)] == [20, 10, 10]
+    assert [np.count_nonzero(np.isclose(found, value)) for value in (0.0, 8.0, -5.0)] == [100, 49, 50]
 
 
 def test_a_term_that_takes_away_a_hundredth_of_the_loss_is_taken_although_it_is_within_one_standard_error():

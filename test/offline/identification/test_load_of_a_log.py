@@ -68,11 +68,17 @@ def test_identify_gives_friction_and_load_without_a_load_cell(tmp_path, rig):
     assert estimates_of(run, within, 0.1, force).state == FrictionState.SLIDING
 
 
-def test_a_load_that_cannot_be_told_from_friction_is_refused_with_what_to_drive(tmp_path):
-    log = boom.measured(boom.simulate(Boom(), 'single'), 0)
+def test_one_stroke_out_and_back_gives_the_friction_and_one_way_is_refused_with_what_to_drive(tmp_path):
+    simulated = boom.simulate(Boom(), 'single')
+    log = boom.measured(simulated, 0)
     run = Run(tmp_path, *written(tmp_path, log, RIG + POSITION + 'load: position\n'))
-    assert run.code == 2
-    assert 'log.csv: 1 strokes out and 1 back are too few' in run.errors
+    assert run.code == 0, run.errors
+    true = np.abs(simulated.friction[np.abs(simulated.velocity) > 5e-3]).mean()
+    assert np.mean(run.figures['fitted_N']) == pytest.approx(true, rel=0.05)
+    out = log._replace(**{name: column[: np.argmax(log.position)] for name, column in log._asdict().items()})
+    refused = Run(tmp_path, *written(tmp_path, out, RIG + POSITION + 'load: position\n'), name='refused')
+    assert refused.code == 2
+    assert 'log.csv: 1 strokes out and 0 back do not tell a load' in refused.errors
 
 
 def test_the_position_of_a_log_is_read_in_metres(tmp_path):
