@@ -184,7 +184,8 @@ def model_uncertainty(model: ModelFit, readings: FrictionReadings, in_addition: 
 
     with the covariance C of the posterior, and what the model misses: the quantile q that holds 95 % of the rest r of
     the readings, over the mean friction F of their pressure, without the noise n of their sensors, which is none of the
-    friction. `LAW_ERROR` or `CURVED`, and ``in_addition``, as of `prediction_uncertainty`, are added in square. Our choice.
+    friction. `LAW_ERROR` or `CURVED`, and ``in_addition`` as of `prediction_uncertainty`, are added in square. Our
+    choice.
     """
     friction = model.friction(readings.at)
     rest = readings.magnitudes(model.offsets) - friction
