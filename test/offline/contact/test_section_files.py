@@ -167,7 +167,7 @@ def test_a_case_takes_the_roughness_of_its_measured_surfaces(tmp_path: Path):
     [
         ('a.x3p', b'no archive', 'not an X3P archive'),
         ('a.csv', b'x [mm],z [um]\n0,1\n1,2\n5,3\n', 'steps of x are not even'),
-        ('a.csv', b'x [mm],z [bar]\n0,1\n', 'is none of a length'),
+        ('a.csv', b'x [mm],z [bar]\n0,1\n', 'is not for a length'),
         ('a.sur', b'', 'not one of the surfaces that can be read, .csv, .x3p'),
     ],
 )

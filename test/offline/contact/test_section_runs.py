@@ -112,7 +112,7 @@ def test_a_wiper_has_one_friction_and_holds_no_pressure(tmp_path: Path, capsys: 
     law = parse_seal(read_yaml(out)).coulomb_law
     assert law.coulomb_friction(0.0) == law.coulomb_friction(1e5) == pytest.approx(numbers['friction_N'][0], rel=1e-6)
     assert numbers['normal_force_N'][0] > 0.0
-    assert {'normal force', 'peak stress', 'contact width'} <= {*numbers['mesh']['change']}
+    assert {'normal_force_N', 'peak_contact_stress_Pa', 'contact_width_m'} <= {*numbers['mesh']['change']}
 
 
 @pytest.mark.parametrize('radius', ['1mm', '1um'])

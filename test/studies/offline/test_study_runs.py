@@ -107,7 +107,6 @@ def test_every_command_of_the_page_is_one(small, ring, tmp_path, capsys, monkeyp
 def test_every_script_of_the_page_is_one():
     scripts = set(re.findall(r'`python ([^` ]*)', (ROOT / 'docs' / 'ehl.md').read_text()))
     assert scripts == {
-        'bench/ehl.py',
         'test/studies/lubrication_findings.py',
         'test/system/oring_map.py',
         'test/system/speed_on_logs.py',
