@@ -15,8 +15,8 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
-from seal_friction_ros.core.estimation import node_options
-from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationSettings
+from seal_friction_ros.core.estimation import node_options, pipeline
+from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationSettings, AdaptationState
 from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING, Configuration, SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
@@ -122,6 +122,9 @@ class EstimatorNode(ManagedNode):
         self._newest: dict[str, bytes] = {}
         self._bound: dict[str, _Input] = {}  # by name
         self._sending: list[dict[type, _Output]] = []  # of each actuator, by the record of an answer
+        self._emits: list[pipeline.Emit] = []  # of each actuator
+        self._learnt: list[AdaptationState] = []  # of each actuator, when it was last followed
+        self._receipt_offset = 0  # [ns] of the clock over the steady one, as it was at activation
         self._complete: set[str] = set()  # topics that had all numbers of all actuators in a message
         self._logged_errors: dict[str, str] = {}
         self._inputs: dict[str, Any] = {}
@@ -318,6 +321,7 @@ class EstimatorNode(ManagedNode):
             self._on_malformed(heard, error)
             return
         sent = received - lateness if received > lateness else 0
+        self._sent.clear()  # what an error has left
         receive(self._machine, self._state, plan, message, received, self._emits, sent)
         commands = self._send_rest(received) if self._has_rest else []
 
@@ -413,6 +417,7 @@ class EstimatorNode(ManagedNode):
     def _tick(self, number: int, received: int) -> None:
         made, plan = self._state.actuators[number].pipeline.feedforward.received, self._ticks[number]
         tick = WatchdogTick(received + self._clock_offset, (received - made) * 1e-9)
+        self._sent.clear()
         receive(self._machine, self._state, plan, tick, received, self._emits)
         commands = self._send_rest(received) if self._has_rest else []
         self.recording.record(plan.topic, TICK_TYPE, received, encode(tick))

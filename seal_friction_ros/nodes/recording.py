@@ -71,11 +71,6 @@ class Recording:
         if self.recorder is not None:
             self.recorder.record(topic, type_name, log_time, data, publish_time)
 
-    def flush_if_idle(self) -> None:
-        """Let the recorder write now, right after an answer."""
-        if self.recorder is not None:
-            self.recorder.flush_if_idle()
-
     def stop(self) -> str:
         """Finish the bag in the background, so that the disk does not delay the estimate.
 

@@ -169,6 +169,7 @@ def test_lifecycle_services_start_and_stop_it():
         assert state.label == 'unconfigured'
         for number in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
             assert g.call(ChangeState, 'friction_estimator/change_state', transition(number)).success
+            g.spin_until(lambda: False, 0.1)  # the watchdog is called while the node is inactive, too
         g.connect()
         assert g.estimate(SECOND, 0.1).state == FrictionEstimate.SLIDING
         assert g.call(

@@ -176,7 +176,7 @@ class AdaptationState(NamedTuple):
     twice: Lagging
     acceleration: float  # [m/s^2] of the velocity after two lags
     way: float  # [m] since the last reading of the filter
-    fastest: float  # [m/s] fastest speed, which fades over `USUAL_TIME`
+    fastest: float  # [m/s] fastest speed of even motion, which fades over `USUAL_TIME`
     bias: float  # [-] mean of the normalised innovations over `SHORT_TIME`
     filter: FrictionFilter
     by_motion: FrictionFilter  # the filter without readings of a rod that may have rested all the time
@@ -247,18 +247,18 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     twice = _lagging(state.twice, once, share)
     at_first = (velocity - state.once.velocity) / (elapsed + LAG)
     acceleration = (once.velocity - state.twice.velocity) / (elapsed + LAG)
-    rest = _rested(state, slide, direction, elapsed)
+    rest = _rested(settings, state, slide, direction, elapsed)
     bias, known, strokes = state.bias, state.filter, state.strokes
     speed, fastest = abs(velocity), state.fastest * (1.0 - elapsed / USUAL_TIME)
     is_even = slide.is_usable and direction != 0 and _is_even(settings, acceleration, at_first, friction)
     fastest = speed if is_even and speed > fastest else fastest
     may_rest = speed < slide.slow <= fastest  # a rod that is never faster could not be learnt from at all
     way = state.way + 0.5 * elapsed * (state.twice.velocity + twice.velocity)
-    by_motion = state.by_motion
+    by_motion, newest_way = state.by_motion, way - state.way
     if fastest < slide.slow:
-        by_motion = _moved(by_motion, way - state.way)
+        by_motion = _moved(by_motion, newest_way if state.fastest < slide.slow else way)
     elif state.fastest < slide.slow:  # the slow motion before may have been the zero of its sensor
-        known, way, bias = by_motion, 0.0, 0.0
+        known, way, bias = by_motion, newest_way, 0.0
     if is_even:
         is_outlier = False
         if slide.is_identified and known.stamp != NEVER:
@@ -301,17 +301,18 @@ def _moved(known: FrictionFilter, way: float) -> FrictionFilter:
 
 
 @compilable
-def _rested(state: AdaptationState, slide: Slide, direction: int, elapsed: float) -> Rest:
+def _rested(settings: AdaptationSettings, state: AdaptationState, slide: Slide, direction: int, elapsed: float) -> Rest:
     """What the force sum has done in this rest, after one more sample."""
-    before = state.rest
+    before, outlook = state.rest, state.outlook
     change, leap = slide.force_sum - state.twice.force_sum, slide.force_sum - state.once.force_sum
     ripple = before.ripple + elapsed / (elapsed + SHORT_TIME) * (change * change - before.ripple)
     held = before.held * (1.0 - elapsed / USUAL_TIME)
     if direction != 0:
         return Rest(slide.stamp, ripple, 0.0, 0.0, held)
-    beyond = abs(slide.force_sum - state.outlook.offset) - state.outlook.scale * slide.friction
-    if slide.is_usable and beyond > held and (slide.stamp - before.slid) * 1e-9 >= REST:
-        held = beyond
+    beyond = abs(slide.force_sum - outlook.offset) - outlook.scale * slide.friction
+    most = (settings.scale_max - outlook.scale) * slide.friction
+    if slide.is_usable and outlook.is_proven and beyond > held and (slide.stamp - before.slid) * 1e-9 >= REST:
+        held = beyond if beyond < most else most  # more is an end stop
     pressed = before.pressed + elapsed if slide.is_pressed else before.pressed
     leapt = before.leapt
     if abs(leap) > LEAP_AT_REST * slide.friction and leap * leap > leapt:

@@ -335,10 +335,15 @@ def fit_model(readings: FrictionReadings, columns: Sequence[Columns], told: Told
         residual = readings.at.direction * (readings.force - free) - fit.friction(readings.at)
         fitted = len(vector) - float(np.sum(np.diag(fit.covariance) / problem.prior[:, 1] ** 2))
         weight, scatter = _weights(readings, residual, problem.size, fitted)
-    unsure = _weights(readings, residual, problem.size, fitted, CLUSTER_PRIOR * told.areas)[0]
+    # An area must not explain what strokes and pressures usually differ by.
+    unsure = _weights(readings, residual, problem.size, fitted, CLUSTER_PRIOR if told.areas else 0.0)[0]
     optional = [sorted({getattr(told, name), False}) for name in OPTIONAL]
     choices = [told._replace(**dict(zip(OPTIONAL, one, strict=True))) for one in product(*optional)]
-    odds = [_log_odds(_problem(readings, columns, one), unsure, vector) - LOG_ODDS * sum(one[1:]) for one in choices]
+    odds = [
+        _log_evidence(_problem(readings, columns, one), unsure, vector)
+        - LOG_ODDS * sum(getattr(one, name) for name in OPTIONAL)
+        for one in choices
+    ]
     problem = _problem(readings, columns, choices[int(np.argmax(odds))])
     vector, jacobian, left = _solved(problem, weight, vector)
     return _model_fit(problem, vector, jacobian, left, scatter)
@@ -378,7 +383,7 @@ def left_out(fit: ModelFit, readings: FrictionReadings) -> tuple[FloatArray, Flo
     return predicted, signed, np.array(vectors)
 
 
-def _log_odds(problem: Problem, weight: FloatArray, start: FloatArray) -> float:
+def _log_evidence(problem: Problem, weight: FloatArray, start: FloatArray) -> float:
     """Logarithm of the probability of the readings by the method of Laplace, but for a constant."""
     _, jacobian, left = _solved(problem, weight, start)
     determinant = float(np.linalg.slogdet(jacobian.T @ jacobian)[1])

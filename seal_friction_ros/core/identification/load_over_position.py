@@ -71,7 +71,8 @@ class LoadOverPosition:
 
     knots: FloatArray  # [m] increasing, shape (k >= 4,); a cubic spline (not-a-knot) runs through them
     forces: FloatArray  # [N] load at the knots, positive if it pushes the rod in, shape (k,)
-    std: FloatArray  # [N] standard deviation of the load at the knots, by the jackknife over strokes, shape (k,)
+    std: FloatArray
+    """[N] standard deviation of the load at the knots, by the jackknife over pairs of strokes, or parts of one"""
     mass: float  # [kg] equivalent mass in the middle of the knots; 0 if the log shows none
     mass_change: tuple[float, float]  # [kg/m, kg/m^2] of the equivalent mass over position from the middle
     mass_std: float  # [kg]

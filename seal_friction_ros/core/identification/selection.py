@@ -30,7 +30,7 @@ from seal_friction_ros.core.identification.validation import CrossValidation, Ti
 BEATEN_CONFIDENCE = 0.95  # of the test whether a law is beaten (our choice)
 NEAR = 2.0  # a sound law is near if its loss is at most as many times that of the best (our choice)
 RISES = 2.0  # standard errors of the rise over the pressures from which friction rises (our choice)
-SPEEDS_DIFFER = 1.5  # two speeds at one pressure, above which velocity terms are tried (our choice)
+SPEEDS_DIFFER = 1.5  # fastest over slowest speed, from which velocity terms are tried (our choice)
 FEWEST_PRESSURES_FOR_EXPONENT = 6  # with fewer, leaving each out in turn does not determine an exponent (our choice)
 STRATA = 3  # quantiles of speed and of pressure, whose cells of a swept log are left out in turn (our choice)
 

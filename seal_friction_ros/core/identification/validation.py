@@ -180,12 +180,12 @@ def _two_parts(friction: FloatArray, squares: FloatArray) -> PredictionUncertain
 def model_uncertainty(model: ModelFit, readings: FrictionReadings, in_addition: float) -> PredictionUncertainty:
     r"""Standard deviation of the friction by a model with priors, which its readings were fitted by.
 
-    .. math:: \sigma^2 = g^T C\,g + (q\,F)^2\,(1 - \overline{n^2} / \overline{r^2})
+    .. math:: \sigma^2 = g^T C\,g + (q\,F)^2\,(N / (N - k) - \overline{n^2} / \overline{r^2})
 
     with the covariance C of the posterior, and what the model misses: the quantile q that holds 95 % of the rest r of
     the readings, over the mean friction F of their pressure, without the noise n of their sensors, which is none of the
-    friction. `LAW_ERROR` or `CURVED`, and ``in_addition`` as of `prediction_uncertainty`, are added in square. Our
-    choice.
+    friction; N readings, k terms fitted. `LAW_ERROR` or `CURVED`, and ``in_addition`` as of `prediction_uncertainty`,
+    are added in square. Our choice.
     """
     friction = model.friction(readings.at)
     rest = readings.magnitudes(model.offsets) - friction

@@ -8,7 +8,7 @@ pressure on its face, and the gap follows linearly about that state,
 with the compliances K of the cells (`elasticity.condensed_body`) and C of the nodes, areas A of the nodes, and gap g_0
 and pressure q_0 of the dry ring at its nodes. The pressure b falls linearly from one end of the film to the other. So s
 is the face without what presses on it: smooth, where gap and pressure have edges that lie between two nodes (our
-choice; interpolated themselves they move the friction at 0.1 m/s by up to 10 % from one mesh to the next).
+choice; interpolating gap and pressure moves the friction at 0.1 m/s by up to 10 % from one mesh to the next).
 
 The film reaches a quarter of the contact width beyond both edges of the contact, as far as the face is less steep than
 45 degrees (our choice). Under a high pressure that is next to the wall of the groove, where the face turns away within

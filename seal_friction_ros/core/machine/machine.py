@@ -303,6 +303,9 @@ def receive(
             running.restore(kept)
             known.force, known.fault = 0.0, f'{plan.topic}: {type(error).__name__}: {error}'
             continue
+        except BaseException:  # an answer could not be sent
+            running.restore(kept)
+            raise
         known.memory, known.fault = memory, ''
         if running.feedforward is not made:
             known.force = newest_force(running.feedforward)

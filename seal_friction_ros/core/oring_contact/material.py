@@ -185,8 +185,9 @@ def rubber_of_tension(stretch: FloatArray, stress: FloatArray, model: str = 'yeo
     found = lsq_linear(np.transpose(columns) / size, stress, (lower, np.inf), method='bvls').x / size
     terms = {alpha: c for alpha, c in zip(exponents, found.tolist(), strict=False) if c > 0.0}
     first, elastic_modulus = terms.get(2.0, 0.0), 1.5 * sum(c * alpha**2 for alpha, c in terms.items())
-    if not (elastic_modulus if model == 'ogden' else first) > 6e3:
-        raise ValueError(f'the test curve is not that of a rubber of {model}: its modulus is {elastic_modulus:.3g} Pa')
+    if not (first > 1e3 or (model == 'ogden' and elastic_modulus > 6e3)):
+        said = f'C10 is {first:.3g} Pa, its modulus {elastic_modulus:.3g} Pa'
+        raise ValueError(f'the test curve is not that of a rubber of {model}: {said}')
     if model == 'ogden':
         moduli = tuple(alpha * c for alpha, c in terms.items())
         return Rubber(elastic_modulus=elastic_modulus, ogden_moduli=moduli, ogden_exponents=tuple(terms))

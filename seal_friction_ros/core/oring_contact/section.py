@@ -186,7 +186,7 @@ def lip_seal(
 ) -> Section:
     """Asymmetric lip seal of height 1: the lip on the inside slides; that on the outside is longer, thicker, steeper.
 
-    Its ``lip_thickness`` is 0.1 larger, its edge half of ``tip`` behind the front, its flank twice as near to the wall.
+    Its ``lip_thickness`` is 0.1 larger, its edge half of ``tip`` behind the front, its flank half as far from the wall.
     """
     rise = (1.0 - heel) / 3.0
     inside = _lip('lip_seal', length, 0.5 - 2.0 * rise, groove_depth, lip_thickness, tip)

@@ -31,7 +31,9 @@ class MeshLevels(NamedTuple):
         for name, changes in self.change.items():
             worst = max(changes)
             where = f' at {self.pressures[changes.index(worst)] / BAR:.3g} bar' if len(changes) > 1 else ''
-            if worst > DISCRETISATION:
+            if worst == np.inf:
+                said.append(f'{name}{where} on this mesh only')
+            elif worst > DISCRETISATION:
                 said.append(f'{name} by {100.0 * worst:.2g} %{where}')
         return said
 

@@ -39,9 +39,9 @@ _UNPRESSURISED = 1e5  # [Pa] up to which a seal counts as without pressure (our 
 DIGITS = 8  # of a computed number in a seal file
 ON_OTHER_MESHES = (
     'normal_force_N', 'wall_force_N', 'peak_contact_stress_Pa', 'contact_width_m', 'area_deformation_gain',
-    'radial_force_N', 'friction_N', 'shear_stress_Pa', 'knee_stress_Pa', 'film_out_m', 'film_back_m',
+    'friction_N', 'shear_stress_Pa', 'knee_stress_Pa', 'film_out_m', 'film_back_m',
 )  # fmt: skip
-"""Numbers of an `OringSummary` that are compared with those of other meshes; the leakage is a difference of two."""
+"""Numbers of an `OringSummary` that are compared with other meshes; leakage and radial force are differences."""
 
 
 @dataclass(frozen=True)

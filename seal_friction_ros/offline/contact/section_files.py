@@ -102,7 +102,8 @@ def read_heights(path: Path) -> tuple[FloatArray, tuple[float, float]]:
 
 def _x3p_heights(archive: zipfile.ZipFile) -> tuple[FloatArray, tuple[float, float]]:
     """Heights of an archive: its main.xml says what its binary data are, all in metres."""
-    text = archive.read('main.xml')[:_MOST_XML].decode('utf-8', 'replace')
+    with archive.open('main.xml') as stream:
+        text = stream.read(_MOST_XML).decode('utf-8', 'replace')
 
     def entry(tag: str, of: str = text) -> str:
         found = re.search(rf'<(?:\w+:)?{tag}\b[^>]*>(.*?)</(?:\w+:)?{tag}>', of, re.DOTALL)

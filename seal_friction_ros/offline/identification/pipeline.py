@@ -339,18 +339,19 @@ def assess(
     offsets = fitting.offsets_of(everything, found.friction(everything.at))
     friction = found.friction(used.at)
     between = runs.between_runs(used, friction, fitting.offsets_of(used, friction))
+    spread = between.of_band if run_to_run is None else run_to_run  # that a fit to all runs lacks
     if run_to_run is not None:
         between, of_band = between._replace(std=run_to_run), run_to_run
     elif data.used.left_out_by in ('test', 'file'):  # groups that are runs: what they deviate by contains it
         between, of_band = between._replace(std=0.0), 0.0
     else:
         of_band = between.of_band
-    unseen = collinear_spread(selection.scores, found, used)
+    unseen = 0.0 if found.model else collinear_spread(selection.scores, found, used)
     if found.model is None:
         both = math.hypot(of_band, unseen)
         uncertainty = validation.prediction_uncertainty(left_out.predicted, left_out.deviation, groups, both)
     else:
-        uncertainty = validation.model_uncertainty(found.model, used, of_band)
+        uncertainty = validation.model_uncertainty(found.model, used, spread)
     with progress('test the band', groups * (groups - 1)) as advance:
         coverage = validation.band_coverage(selection.law, selection.readings, found.values, advance)
     names = [parameter.name for parameter in selection.law.parameters]

@@ -244,6 +244,34 @@ def test_a_slow_rod_may_have_the_friction_that_a_rest_held():
     assert std_at(rested, 0.1) == pytest.approx(std_at(taught, 0.1), rel=0.05)
 
 
+def test_what_rests_held_counts_once_the_offset_is_told_and_up_to_the_largest_scale():
+    def rest(force, state):
+        return adapted(moving(1.0, lambda _: 0.0, lambda _: force, state.stamp + SECOND // 100), state=state)
+
+    one_way = adapted(moving(1.0, lambda _: 0.02, lambda _: 540.0))  # 500 N of gravity or of friction
+    assert rest(460.0, one_way).rest.held == 0.0
+    taught = adapted(strokes(10.0, friction=40.0))
+    most = (SETTINGS.scale_max - learnt(taught).scale) * 40.0
+    assert rest(5000.0, taught).rest.held == pytest.approx(most, rel=0.02)  # an end stop
+
+
+def test_an_offset_that_rises_over_the_way_is_where_the_rod_is_after_a_rest_of_minutes():
+    def side(time):
+        return 1.0 if int(time + 1e-9) % 2 == 0 else -1.0
+
+    def place(time):
+        return 0.05 * (time % 1.0 if side(time) > 0.0 else 1.0 - time % 1.0)
+
+    def load(where):
+        return 400.0 * where
+
+    taught = adapted(moving(41.0, lambda t: 0.05 * side(t), lambda t: 40.0 * side(t) + load(place(t))))
+    rested = adapted(moving(300.0, lambda _: 0.0, lambda _: 0.0, taught.stamp + SECOND // 100, 0.05), state=taught)
+    start = rested.stamp + SECOND // 100
+    back = adapted(moving(0.3, lambda _: -0.05, lambda t: load(0.05 * (1.0 - t)) - 40.0, start), state=rested)
+    assert back.filter.terms.offset == pytest.approx(load(0.05 * 0.7), abs=4.0)
+
+
 def test_viscous_friction_of_slow_strokes_is_not_sure_at_a_higher_speed():
     def side(time):
         return 1.0 if int(time + 1e-9) % 2 == 0 else -1.0

@@ -54,6 +54,10 @@ class Run:
         return {name: record.force for name, record, _ in self.answers if isinstance(record, FeedForward)}
 
 
+def kept_of(run):
+    return [(one.pipeline.kept(), one.memory, one.force, one.fault) for one in run.state.actuators]
+
+
 def bench_run(velocity=0.0, samples=300, load=None, p_a=2e6, p_b=1e6, **changes):
     run = Run(made(BENCH, **changes))
     balance = p_a * AREA_A - p_b * AREA_B
@@ -237,10 +241,25 @@ def test_a_message_that_fails_half_way_changes_nothing(monkeypatch):
 
 def test_bytes_that_are_no_message_are_refused_and_change_nothing():
     run = Run(made(EXCAVATOR))
-    before = run.state
+    before = kept_of(run)
     with pytest.raises(ValueError, match='JointState'):
         run.take('/joint_states', b'\x00\x01\x00\x00\xff', 5)
-    assert run.state is before
+    assert kept_of(run) == before
+
+
+def test_an_answer_that_cannot_be_sent_leaves_no_half_state():
+    run = Run(made(EXCAVATOR))
+    before = kept_of(run)
+
+    def fails(*arguments):
+        raise ConnectionError('gone')
+
+    emits = m.named_emits(run.machine, fails)
+    joints = {'name': ['boom', 'arm', 'bucket'], 'velocity': [0.2] * 3, 'position': [0.1] * 3}
+    plan = run.machine.plans['/joint_states']
+    with pytest.raises(ConnectionError):
+        m.receive(run.machine, run.state, plan, plan.read(message('sensor_msgs/JointState', MS, **joints)), MS, emits)
+    assert kept_of(run) == before
 
 
 def test_a_wrong_field_is_named_with_its_topic():
