@@ -149,7 +149,8 @@ class EstimatorDiagnostics:
         self._by_status.update(status := [estimate.status for estimate, _ in estimates])
         self._latencies += [latency for _, latency in estimates]
         for estimate, _ in estimates:
-            self._starts = seal_health.with_sample(self._starts, estimate)
+            if estimate.adaptation_scale_std != 0.0:  # without adaptation there is no residual
+                self._starts = seal_health.with_sample(self._starts, estimate)
         self._estimate = self._newest[FrictionEstimate] = estimates[-1][0]
         self._status = reduce(or_, status, self._status)
 
