@@ -59,7 +59,7 @@ def estimated(log: Recording, seals: EstimatorParameters, mode: str, has_load: b
 def identified(machine: Machine, seed: int, folder: Path) -> EstimatorParameters | None:
     """Seals by the first recording; None: identification refuses it."""
     first = record(machine, machine.supplies, (0.02, 0.08), (0.0, 0.4), seed)
-    run = Run(folder, *write_log(first, folder, 'first', seed), *WAYS['one'], '--run-to-run', '0')
+    run = Run(folder, *write_log(first, folder, 'first', seed, machine.noise), *WAYS['one'], '--run-to-run', '0')
     if run.code:
         return None
     selection = SealSelection((str(run.out),), ('mounting',))

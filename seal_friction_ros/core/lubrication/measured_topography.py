@@ -34,8 +34,11 @@ class Roughness(NamedTuple):
 def measured_roughness(heights: FloatArray, spacing: tuple[float, float]) -> Roughness:
     """Roughness of heights [m], shape (m, n), at steps of ``spacing`` [m] across and along the motion.
 
-    A profile has the shape (1, n). A parabola along each axis is taken away as form (our choice). ValueError: there are
-    too few heights, they are level, or the surface is shorter than ten of its autocorrelation lengths.
+    A profile has the shape (1, n). A parabola along each axis is taken away as form (our choice). The slope is that at
+    these steps: finer steps give a steeper one.
+
+    ValueError: there are too few heights, they are level, or the surface is shorter than ten of its autocorrelation
+    lengths.
     """
     if heights.shape[1] < _FEWEST or not np.isfinite(heights).all():
         raise ValueError(f'a surface needs {_FEWEST} finite heights or more along the motion, not {heights.shape[1]}')
