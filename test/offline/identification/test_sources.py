@@ -122,6 +122,19 @@ def test_runs_that_were_repeated_tell_how_far_a_new_one_may_be_off(tmp_path):
     assert shares.max() < 2.0 * between
 
 
+@pytest.mark.parametrize('law', ['pressure_power_law_1', 'all_terms'])
+def test_the_band_of_a_law_holds_what_runs_differ_by(tmp_path, law):
+    """Each run has all pressures, so one is predicted from the other; a fit to both is nearer than a new run."""
+    for name, factor in (('low', 0.9), ('high', 1.2)):
+        part = wave((1e5, 3e5, 5e5, 7e5), friction=lambda p, k=factor: k * (4.0 + 6e-6 * p))
+        write_samples(tmp_path / name, part, 'rod')
+    run = Run(tmp_path, str(tmp_path / 'low'), str(tmp_path / 'high'), '--law', law)
+    between = 0.3 / 2.1 * 2.0**0.5  # standard deviation of 0.9 and 1.2 over their mean
+    shares = np.array(run.figures['std_N']) / np.array(run.figures['fitted_N'])
+    assert between < shares.min()
+    assert shares.max() < 1.3 * between
+
+
 def test_a_sensor_that_stands_still_while_the_rod_rests_is_not_clipped(tmp_path):
     rest = Samples(*(np.repeat(column[:1], 600) for column in GOOD))
     rest = rest._replace(velocity=np.zeros(600), force_sum=np.full(600, -30.0))
