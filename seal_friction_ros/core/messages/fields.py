@@ -246,6 +246,7 @@ class _Found:
         if given:
             self.missing = f'{step.key!r} stands {given} times in {step.names or "name"}: ambiguous, none is taken'
             return -1
-        shown = ', '.join(printable(name) for name in names[:_SHOWN]) or 'none'
+        # Sorted: publishers that change the order of the names are told once.
+        shown = ', '.join(printable(name) for name in sorted(names)[:_SHOWN]) or 'none'
         self.missing = f'no {step.key!r} in {step.names or "name"}: it has {shown}{_meant(names, str(step.key))}'
         return -1

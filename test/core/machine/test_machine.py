@@ -200,7 +200,7 @@ def test_an_array_that_is_too_short_leaves_the_last_actuator_without_pressure():
 def test_what_a_message_lacks_is_said():
     machine = made(EXCAVATOR)
     data = message('sensor_msgs/JointState', name=['boom', 'arm', 'buckett'], velocity=[1.0, 2.0, 3.0])
-    text = "no 'bucket' in name: it has boom, arm, buckett; did you mean buckett?"
+    text = "no 'bucket' in name: it has arm, boom, buckett; did you mean buckett?"
     assert [m.missing(machine, number, '/joint_states', data) for number in range(3)] == [[], [], [text]]
 
 

@@ -143,7 +143,7 @@ def test_what_a_message_lacks_is_none_and_is_said():
     assert read.numbers[:2] == (None, None)
     assert math.isnan(read.numbers[2])  # a number that is not one is something else than no number
     assert read.missing == (
-        "no 'bom' in name: it has boom, arm; did you mean boom?",
+        "no 'bom' in name: it has arm, boom; did you mean boom?",
         'effort[boom]: effort has 0 elements',
     )
 
@@ -444,10 +444,10 @@ def test_twenty_names_are_shown_of_a_message_that_has_not_the_one_that_is_wanted
     make = message_class(JOINT_STATE)
     for count, shown in (
         (0, 'none'),
-        (20, ', '.join(f'j{i}' for i in range(20))),
-        (21, ', '.join(f'j{i}' for i in range(20))),
+        (20, ', '.join(f'j{i:02}' for i in range(20))),
+        (21, ', '.join(f'j{i:02}' for i in range(20))),
     ):
-        names = [f'j{i}' for i in range(count)]
+        names = [f'j{i:02}' for i in reversed(range(count))]  # shown sorted: any order of them is one text
         read = reader_of(JOINT_STATE, 'position[zzzz]').read(
             serialize_message(make(name=names, position=[0.0] * count))
         )
