@@ -88,7 +88,7 @@ def test_an_imported_bag_is_tuned_identified_and_replayed(tmp_path, source, caps
 @pytest.mark.parametrize(
     ('change', 'error'),
     [
-        (('velocity[axis]\n      position', 'velocity[axes]\n      position'), "no 'axes' in name: it has other, axis"),
+        (('velocity[axis]\n      position', 'velocity[axes]\n      position'), "no 'axes' in name: it has axis, other"),
         (('/p_a: sensor_msgs/msg/FluidPressure', '/p_a: std_msgs/msg/Float64'), 'but .* has sensor_msgs'),
         (('/joint_states velocity[axis]', '/joint_states velocitys[axis]'), 'did you mean velocity'),
     ],
