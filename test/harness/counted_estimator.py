@@ -5,19 +5,19 @@ from collections.abc import Callable
 from typing import Any
 
 from seal_friction_ros.core.machine.machine import due
-from seal_friction_ros.core.messages.records import Output
+from seal_friction_ros.core.messages.records import FeedForward, Output
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 
 
 class CountedEstimator(FrictionEstimator):
-    """`FrictionEstimator` with ``taken``, the number of input messages taken, and ``sent``, the number of answers.
+    """`FrictionEstimator` with the numbers of input messages ``taken``, and of answers ``sent``, ``forces`` among them.
 
     ``clock`` may be set before activation: the time of receipt [ns] instead of that of the machine. Messages are sent
     at their receipt then, and no clock is followed.
     """
 
     def __init__(self, **kwargs: Any) -> None:
-        self.taken = self.sent = 0
+        self.taken = self.sent = self.forces = 0
         self.clock: Callable[[], int] | None = None
         super().__init__(**kwargs)
 
@@ -49,3 +49,4 @@ class CountedEstimator(FrictionEstimator):
     def _send(self, outputs: Any, answer: Output, frame_id: bytes) -> None:
         super()._send(outputs, answer, frame_id)
         self.sent += 1
+        self.forces += isinstance(answer, FeedForward)

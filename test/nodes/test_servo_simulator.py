@@ -78,6 +78,18 @@ class Listener(Node):
         return {}
 
 
+class CountedSimulator(ServoSimulator):
+    """With the number of forces of the estimator that it has ``heard``."""
+
+    def __init__(self, **kwargs):
+        self.heard = 0
+        super().__init__(**kwargs)
+
+    def _on_feedforward(self, data):
+        super()._on_feedforward(data)
+        self.heard += 1
+
+
 class Stage(SpunNodes):
     """Simulator, listener and, if wanted, estimator."""
 
@@ -123,7 +135,7 @@ def parameters(values):
 def stage(values=None, estimator=None, *, autostart=True):
     with ros_context() as context:
         nodes = [
-            ServoSimulator(context=context, parameter_overrides=parameters({**SLOW, **(values or {})})),
+            CountedSimulator(context=context, parameter_overrides=parameters({**SLOW, **(values or {})})),
             Listener(context=context),
         ]
         if estimator is not None:
@@ -213,7 +225,12 @@ def test_with_the_estimator_the_loop_closes_and_what_was_recorded_verifies(tmp_p
     with stage(plant, estimator, autostart=False) as s:
         ended = threading.Event()
         in_step.may_pass = lambda: (
-            ended.is_set() or (s.simulator.active and s.estimator.taken >= MESSAGES * s.simulator.ticks)
+            ended.is_set()
+            or (
+                s.simulator.active
+                and s.estimator.taken >= MESSAGES * s.simulator.ticks
+                and s.simulator.heard >= s.estimator.forces
+            )
         )
         try:
             s.start()
@@ -227,9 +244,10 @@ def test_with_the_estimator_the_loop_closes_and_what_was_recorded_verifies(tmp_p
     run = read_run(tmp_path / 'bag')
     status = run.status[1:]  # the clock is at 0 s, as before it came, when the first sample comes
     usual = int(Status.MOTION_UNCERTAIN)  # near rest, at reversals
-    # A busy machine may bring a message, or the force to the simulator, a tick late: then the loop swings about rest.
-    assert np.bitwise_or.reduce(status) & ~int(Status.MODEL_DISAGREES) in (0, usual)
-    assert np.count_nonzero(status[100:]) <= 0.5 * len(status)
+    is_in_order = (run.input_age == 0.0).all()  # a busy machine may take the messages of a sample in another order:
+    other = 0 if is_in_order else int(Status.MODEL_DISAGREES)  # then the force sum is that of the sample before
+    assert np.bitwise_or.reduce(status) & ~other == usual
+    assert np.count_nonzero(status[100:] & usual) <= 0.05 * len(status)
     assert float(abs(run.feedforward_force[200:]).max()) == pytest.approx(SCALE * run.coulomb_friction.max(), rel=0.1)
 
 
