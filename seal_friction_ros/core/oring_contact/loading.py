@@ -196,6 +196,7 @@ def _raise_pressure(
     """Ring under the pressure ``target`` [Pa], and the pressure rise [Pa] to try in the next step."""
 
     def rising(share: float, state: OringState, done: float) -> Surroundings:
+        """Surroundings at a share of the rise; the fluid wets what it wets by the pressure before."""
         before, risen = (
             now.surroundings._replace(pressure=now.pressure + part * (target - now.pressure)) for part in (done, share)
         )

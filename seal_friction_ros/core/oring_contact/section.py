@@ -114,6 +114,7 @@ def rounded(section: Section, radius: float, *, outside: bool) -> Section:
     low, high = section.outline[:, 0].min(), section.outline[:, 0].max()
 
     def with_arcs(polygon: FloatArray) -> FloatArray:
+        """Polygon of shape (n, 2) with an arc for each corner near the wall."""
         before, after = polygon - np.roll(polygon, 1, axis=0), np.roll(polygon, -1, axis=0) - polygon
         turns = np.arctan2(_cross(before, after), (before * after).sum(axis=1))
         near = (high - polygon[:, 0] if outside else polygon[:, 0] - low) < NEAR_WALL * (high - low)
@@ -217,7 +218,10 @@ def _lip(shape: str, length: float, flank: float, groove_depth: float, lip_thick
     Proportions are ours.
     """
     if not (0.0 < lip_thickness < 0.5 and 0.0 < tip < groove_depth < length and 0.1 < flank <= 0.5):
-        raise ValueError(f'{shape}: lips thinner than half, tip < groove_depth < length, heel below 1 are needed')
+        raise ValueError(
+            f'{shape}: 0 < lip_thickness < 0.5, 0 < tip < groove_depth < length, and a body that '
+            'reaches 0.1 to 0.5 of the height from the middle (heel) are needed'
+        )
     front, back = -0.5 * length, 0.5 * length
     root, inner = front + groove_depth, 0.5 - lip_thickness
     return np.array([

@@ -106,6 +106,7 @@ def _x3p_heights(archive: zipfile.ZipFile) -> tuple[FloatArray, tuple[float, flo
         text = stream.read(_MOST_XML).decode('utf-8', 'replace')
 
     def entry(tag: str, of: str = text) -> str:
+        """Text within a tag of main.xml. ValueError: it has none."""
         found = re.search(rf'<(?:\w+:)?{tag}\b[^>]*>(.*?)</(?:\w+:)?{tag}>', of, re.DOTALL)
         if found is None:
             raise ValueError(f'its main.xml has no {tag}')
