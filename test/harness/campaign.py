@@ -2,12 +2,16 @@
 
 import argparse
 import json
+import sys
 from collections.abc import Mapping, Sequence
+from contextlib import redirect_stdout
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
+
+from seal_friction_ros.offline.commands.main import main
 
 _ANY = 10_000  # columns, more than any table has
 Rows = Sequence[Mapping[str, Any]] | Mapping[str, Any]
@@ -22,6 +26,14 @@ def parser_of(description: str, **numbers: tuple[float, str]) -> argparse.Argume
         parser.add_argument(f'--{name.replace("_", "-")}', type=type(default), default=default, help=text)
     parser.add_argument('--json', action='store_true', help='print JSON')
     return parser
+
+
+def run_command(*words: object) -> None:
+    """Run a command that must succeed; what it prints goes to standard error, beside the table or JSON."""
+    with redirect_stdout(sys.stderr):
+        code = main([str(word) for word in words])
+    if code != 0:
+        raise SystemExit(f'seal_friction {words[0]} failed')
 
 
 def tell(found: Rows, *, as_json: bool, title: str = '') -> None:

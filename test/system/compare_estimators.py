@@ -24,7 +24,7 @@ from matplotlib.figure import Figure
 from scipy.stats import chi2
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from harness.campaign import parser_of, tell_tables
+from harness.campaign import parser_of, run_command, tell_tables
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.estimator import init, step
@@ -35,7 +35,6 @@ from seal_friction_ros.core.friction.force_sum_correction import corrected_force
 from seal_friction_ros.core.messages.coder import DECODERS
 from seal_friction_ros.core.messages.records import Force, Pressure, Velocity
 from seal_friction_ros.offline.bags.bag import read_messages
-from seal_friction_ros.offline.commands.main import main as command
 from seal_friction_ros.offline.replay.replay import chosen_configuration
 
 SLOWEST, LARGEST_ACCELERATION = 0.01, 0.05  # [m/s], [m/s^2]
@@ -217,8 +216,8 @@ def seals_and_logs(folder: Path, work: Path) -> dict[str, tuple[Path, Log]]:
     found = {}
     for path in sorted(folder.glob('*.exp')):
         bag, seal = work / path.stem, work / f'{path.stem}.yaml'
-        _run('import', 'log', path, '--rig', 'mbari', '--out', bag)
-        _run('identify', path, '--rig', 'mbari', '--out', seal)
+        run_command('import', 'log', path, '--rig', 'mbari', '--out', bag)
+        run_command('identify', path, '--rig', 'mbari', '--out', seal)
         found[path.stem] = seal, read_log(bag)
     return found
 
@@ -238,11 +237,6 @@ def compared(folder: Path, work: Path, figure: Path | None = None) -> dict[str, 
     if figure:
         draw(figure, squares)
     return table
-
-
-def _run(*arguments: object) -> None:
-    if command([str(argument) for argument in arguments]) != 0:
-        raise SystemExit(f'seal_friction {" ".join(map(str, arguments))} failed')
 
 
 def main() -> int:

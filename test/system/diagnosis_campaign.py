@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from harness.campaign import parser_of, tell
+from harness.campaign import parser_of, run_command, tell
 from harness.simulated_day import Day, samples
 from paths import ROOT
 
@@ -36,7 +36,6 @@ from seal_friction_ros.core.messages.records import Force, Pressure
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.bags.import_log import read_samples
 from seal_friction_ros.offline.bags.rig_file import read_rig
-from seal_friction_ros.offline.commands.main import main as seal_friction
 
 SEAL = parse_seal(read_yaml(ROOT / 'config' / 'seals' / 'ms28775_114.yaml'))
 SEALS = (MountedSeal(SEAL, 'a'), MountedSeal(SEAL, 'b'))
@@ -132,7 +131,7 @@ def calls_of_logs(folder: Path, out: Path) -> list[Callable[[], dict[str, Any]]]
         )
         seal = out / f'{rig}.yaml'
         with redirect_stdout(StringIO()):
-            seal_friction(['identify', *map(str, first), '--rig', rig, '--out', str(seal)])
+            run_command('identify', *first, '--rig', rig, '--out', seal)
         calls += [partial(of_log, rig, log, seal, fault) for log in first + more for fault in FAULTS]
     return calls
 

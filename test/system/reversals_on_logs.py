@@ -15,14 +15,13 @@ from typing import NamedTuple
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from harness.campaign import parser_of, tell
+from harness.campaign import parser_of, run_command, tell
 
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.messages.coder import decode
 from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE, VELOCITY_TYPE
 from seal_friction_ros.offline.bags.bag import read_messages
-from seal_friction_ros.offline.commands.main import main as command
 
 MASS = 1.0  # [kg] assumed
 NEAR, FAR = 0.5e-3, 2e-3  # [m] of travel after a reversal
@@ -60,10 +59,10 @@ def errors(work: Path, learnt_on: list[Path], used_on: list[Path], mass: float =
     """With rigid and with elastic seals; ``work`` is a new folder."""
     work.mkdir()
     seal = work / 'seal.yaml'
-    _run('identify', *learnt_on, '--rig', 'delft', '--presliding', '--out', seal)
+    run_command('identify', *learnt_on, '--rig', 'delft', '--presliding', '--out', seal)
     bags = [work / log.stem for log in used_on]
     for log, bag in zip(used_on, bags, strict=True):
-        _run('import', 'log', log, '--rig', 'delft', '--out', bag)
+        run_command('import', 'log', log, '--rig', 'delft', '--out', bag)
     found = []
     for name in ('false', 'true'):
         parameters = work / f'{name}.yaml'
@@ -71,7 +70,7 @@ def errors(work: Path, learnt_on: list[Path], used_on: list[Path], mass: float =
         parts = []
         for bag in bags:
             out = work / f'{bag.name}_{name}'
-            _run('replay', bag, '--seal', seal, '--params', parameters, '--out', out)
+            run_command('replay', bag, '--seal', seal, '--params', parameters, '--out', out)
             parts.append(_near_reversals(out))
         error, good, in_band = (np.concatenate(columns) for columns in zip(*parts, strict=True))
         rms = float(np.sqrt(np.mean(error**2)))
@@ -97,11 +96,6 @@ def _near_reversals(bag: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     error -= 0.5 * (error[far & (direction > 0.0)].mean() + error[far & (direction < 0.0)].mean())
     near = slides & (travel < NEAR)
     return error[near], status[near] == 0, np.abs(error[near]) <= BAND_95 * std[near]
-
-
-def _run(*words: object) -> None:
-    if command([str(word) for word in words]) != 0:
-        raise SystemExit(f'seal_friction {words[0]} failed')
 
 
 def main() -> int:

@@ -16,9 +16,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.campaign import run_command
+
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.offline.bags.recorded_run import read_run
-from seal_friction_ros.offline.commands.main import main as command
 from seal_friction_ros.offline.contact.lubrication_runs import MapRuns, load_case, run_map, seal_document
 from seal_friction_ros.offline.work.seal_writer import write_seal
 
@@ -49,11 +51,11 @@ def slid(log: Path, seals: dict[str, Path], folder: Path) -> Slid:
     """Live friction of a log with each seal file; ``folder`` is for its bags."""
     bag, parameters = folder / log.stem, folder / f'{log.stem}.yaml'
     parameters.write_text(RIGID)
-    _run('import', 'log', log, '--rig', 'delft', '--out', bag)
+    run_command('import', 'log', log, '--rig', 'delft', '--out', bag)
     runs = {}
     for name, seal in seals.items():
         out = folder / f'{log.stem}_{name}'
-        _run('replay', bag, '--seal', seal, '--params', parameters, '--out', out)
+        run_command('replay', bag, '--seal', seal, '--params', parameters, '--out', out)
         runs[name] = read_run(out)
     run = runs['none']
     used = (run.state == FrictionState.SLIDING) & (np.abs(run.velocity) > SLOWEST)
@@ -95,11 +97,6 @@ def slid_logs(paths: list[Path], computed: MapRuns, folder: Path) -> dict[str, S
     """Each log with both maps."""
     seals = seal_files(computed, folder)
     return {path.stem: slid(path, seals, folder) for path in paths}
-
-
-def _run(*words: object) -> None:
-    if command([*map(str, words)]) != 0:
-        raise SystemExit(f'seal_friction {words[0]} failed')
 
 
 def main() -> int:

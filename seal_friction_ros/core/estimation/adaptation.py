@@ -49,9 +49,7 @@ SETTLED = 0.99  # [-] of the friction, which its lagging value must have reached
 JUMPED = 1.1  # [-] of it that the lagging value must not exceed after a pressure that the law does not know
 LARGEST_INERTIA = 0.5  # [-] of the friction, in a reading with a known mass: the mass may be wrong
 LONGEST_STEP = 0.1  # [s] after a longer gap the acceleration starts anew
-LEARNING_INTERVAL = 9_500_000  # [ns] least time between two samples that are learnt from: all of a log at 100 Hz,
-SETTLED_INTERVAL = 19_500_000  # [ns] and this from
-SOON = 10  # readings after a reversal on, while none is an outlier
+LEARNING_INTERVAL = 9_500_000  # [ns] least time between two samples that are learnt from: all of a log at 100 Hz
 LEAST_STD = 0.01  # [-] of the friction, below which no standard deviation is believed
 IMPLAUSIBLE = 5.0  # [-] innovation over its standard deviation that is a fault of its own
 WRONG_DIRECTION = 1.5  # [-] of the friction that a sample misses whose direction is wrong: it misses twice the friction
@@ -220,8 +218,7 @@ class Slide(NamedTuple):
 @compilable
 def is_due(state: AdaptationState, stamp: int) -> bool:
     """Whether the sample of this stamp is to be learnt from: the last one is old enough, or the clock went back."""
-    is_settled = state.strokes.present.samples >= SOON and state.filter.outliers.number == 0
-    return not 0 <= stamp - state.stamp < (SETTLED_INTERVAL if is_settled else LEARNING_INTERVAL)
+    return not 0 <= stamp - state.stamp < LEARNING_INTERVAL
 
 
 @compilable
