@@ -82,6 +82,13 @@ def with_load(rod: Rod, load: np.ndarray | float) -> Rod:
     return replace(rod, force_sum=rod.force_sum + load)
 
 
+def with_unmeasured_force(rod: Rod, force: np.ndarray) -> Rod:
+    """A force on the rod that is not in the force sum: at rest the seals hold it, as far as they can."""
+    most = 0.95 * COULOMB
+    friction = np.where(rod.velocity == 0.0, np.clip(rod.friction + force, -most, most), rod.friction)
+    return with_load(with_friction(rod, friction), -force)
+
+
 def with_friction(rod: Rod, friction: np.ndarray) -> Rod:
     """Another friction."""
     return replace(rod, force_sum=rod.force_sum - rod.friction + friction, friction=friction)
@@ -145,6 +152,9 @@ ATTACKS: dict[str, Callable[[Rod], Rod]] = {
         rod, 2.0 * COULOMB * np.sin(2.2 * (rod.position - rod.position.min()) / np.ptp(rod.position) + 0.3)
     ),
     'payload of 60 N on and off every 7 s': lambda rod: with_load(rod, 60.0 * (rod.time // 7.0 % 2)),
+    'force of 40 N that nobody measures, on and off every 4 s': lambda rod: with_unmeasured_force(
+        rod, 40.0 * (rod.time // 4.0 % 2)
+    ),
     **{f'friction times {f}': (lambda rod, f=f: with_friction(rod, f * rod.friction)) for f in (0.6, 0.8, 1.25, 1.6)},
     **{
         f'direction: {q:.0%} more, {q:.0%} less': (
@@ -165,6 +175,9 @@ ATTACKS: dict[str, Callable[[Rod], Rod]] = {
         for way in (0.05, 0.005)
     },
     'friction halves at 15 s': lambda rod: with_friction(rod, rod.friction * np.where(rod.time > 15.0, 0.5, 1.0)),
+    'friction drifts by 30 % in 5 s': lambda rod: with_friction(
+        rod, rod.friction * (1.0 + 0.3 * np.sin(0.3 * rod.time))
+    ),
     'friction jumps by 30 % every 5 s': lambda rod: with_friction(
         rod, rod.friction * (1.0 + 0.3 * (rod.time // 5.0 % 2))
     ),

@@ -62,6 +62,7 @@ REST = 0.1  # [s] after a motion in which the force sum may be that of the motio
 LEAP_AT_REST = 0.3  # [-] sudden change of the force sum at rest over the friction, from which on it may be a load
 AT_ONCE = 2.0  # [-] on the noise of the force sum at rest, which nothing averages
 LONGEST_PRESS = 0.1  # [s] for which a rod may rest under the breakaway force
+MAY_BE_FRICTION = 0.8  # [-] of what readings have added to the offset since the last reversal
 WAVERING = 0.25  # [-] of the friction: root mean square of a drift that nothing explains,
 LASTING_DRIFT = 0.4  # [-] and that drift just now,
 UNPROVEN_DRIFT = 0.2  # [-] or this before the motion has told the friction
@@ -140,6 +141,8 @@ class Rest(NamedTuple):
     ripple: float = 0.0  # [N^2] mean square of the force sum against its lagging value, over `SHORT_TIME`
     pressed: float = 0.0  # [s] of this rest under the breakaway force, in all
     leapt: float = 0.0  # [N^2] square of the largest sudden change of the force sum in this rest
+    leapt_at: int = NEVER  # [ns] its stamp
+    loaded: float = 0.0  # [N^2] `leapt` once the rod has rested on, until the next reading: it may be a load
     held: float = 0.0  # [N] most that rests held beyond the sliding friction, which fades over `USUAL_TIME`
 
 
@@ -265,12 +268,12 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
         most = JUMPED if slide.is_identified and not strokes.present.is_identified else math.inf
         if most * friction >= twice.friction * direction >= SETTLED * friction >= LEAST_FRICTION:
             force, law = twice.force_sum - settings.moving_mass * acceleration, twice.friction * direction
-            reading = Reading(slide.stamp, force, direction, twice.velocity, way, law, slide.friction_std)
+            reading = Reading(slide.stamp, force, direction, twice.velocity, way, law, slide.friction_std, rest.loaded)
             strokes = _with_reading(strokes, reading, slide.is_identified)
             if is_outlier:
                 known = disregarded(known, reading, elapsed)
             elif slide.is_identified:
-                known, way = updated(known, reading), 0.0
+                known, way, rest = updated(known, reading), 0.0, replace(rest, loaded=0.0)
     outlook = outlook_of(settings, known, way, bias, acceleration, may_rest)
     by_motion = known if fastest >= slide.slow else by_motion
     return AdaptationState(
@@ -281,7 +284,7 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
 @compilable
 def _interrupted(settings: AdaptationSettings, state: AdaptationState, stamp: int, newest: Lagging) -> AdaptationState:
     """State after a gap: signals and strokes begin anew."""
-    known, way, rest = state.filter, state.way, Rest(stamp, 0.0, 0.0, 0.0, state.rest.held)
+    known, way, rest = state.filter, state.way, Rest(stamp, 0.0, 0.0, 0.0, NEVER, 0.0, state.rest.held)
     strokes = Strokes(NO_STROKE, NO_STROKE, state.strokes.ratio, state.strokes.reversals)
     outlook = outlook_of(settings, known, way, 0.0, 0.0, False)
     return AdaptationState(
@@ -305,16 +308,18 @@ def _rested(settings: AdaptationSettings, state: AdaptationState, slide: Slide, 
     ripple = before.ripple + elapsed / (elapsed + SHORT_TIME) * (change * change - before.ripple)
     held = before.held * (1.0 - elapsed / USUAL_TIME)
     if direction != 0:
-        return Rest(slide.stamp, ripple, 0.0, 0.0, held)
+        return Rest(slide.stamp, ripple, 0.0, 0.0, NEVER, before.loaded, held)
     beyond = abs(slide.force_sum - outlook.offset) - outlook.scale * slide.friction
     most = (settings.scale_max - outlook.scale) * slide.friction
     if slide.is_usable and outlook.is_proven and beyond > held and (slide.stamp - before.slid) * 1e-9 >= REST:
         held = beyond if beyond < most else most  # more is an end stop
     pressed = before.pressed + elapsed if slide.is_pressed else before.pressed
-    leapt = before.leapt
+    leapt, leapt_at, loaded = before.leapt, before.leapt_at, before.loaded
+    if leapt > loaded and (slide.stamp - leapt_at) * 1e-9 >= REST:
+        loaded = leapt
     if abs(leap) > LEAP_AT_REST * slide.friction and leap * leap > leapt:
-        leapt = leap * leap
-    return Rest(before.slid, ripple, pressed, leapt, held)
+        leapt, leapt_at = leap * leap, slide.stamp
+    return Rest(before.slid, ripple, pressed, leapt, leapt_at, loaded, held)
 
 
 @compilable
@@ -575,7 +580,8 @@ def _unexplained_square(known: FrictionFilter) -> float:
     That is what the offset took since the last reversal and the drift just now, or all that is not explained.
     """
     unexplained = known.unexplained
-    newest = (unexplained.drift + known.strayed) * (unexplained.drift + known.strayed)
+    newest = unexplained.drift + MAY_BE_FRICTION * known.strayed
+    newest = newest * newest
     largest = newest if newest > unexplained.square else unexplained.square
     return largest - unexplained.drift_square if largest > unexplained.drift_square else 0.0
 
@@ -590,7 +596,8 @@ def _std_at_rest(state: AdaptationState, stamp: int, force_sum: float, most: flo
     noise = change * change if change * change > rest.ripple else rest.ripple
     offset = spread.bb + way * (2.0 * spread.bg + way * spread.gg)
     remainder = known.terms.remainder  # at rest nothing tells it from the offset
-    variance = offset + remainder * remainder + known.strayed * known.strayed + rest.leapt
+    step = known.outliers.last if known.outliers.number != 0 else 0.0  # it may have begun
+    variance = offset + remainder * remainder + known.strayed * known.strayed + rest.leapt + step * step
     variance += AT_ONCE * AT_ONCE * (known.unexplained.square + noise)
     std = math.sqrt(variance) if variance > 0.0 else 0.0
     return std if std < most else most

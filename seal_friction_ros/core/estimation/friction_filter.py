@@ -69,6 +69,7 @@ LEAP = 3.0  # [-] innovations over their deviation within two readings, or at th
 STEP_READINGS = 10  # outliers in a row to one side that make it one,
 FEWEST_OUTLIERS = 3  # or these before the rod turns
 STEP_OF_FRICTION = 0.5  # [-] standard deviation of the scale over that of the offset after a step, both as forces
+LOADED = 2.0  # [-] squared innovation over the squared leap at rest, up to which that explains it as a load
 PROVEN = 0.25  # [-] share: standard deviation of the friction below which the motion has told it
 DRIFT_TIME = 0.08  # [s] over which white noise averages out of what is not explained
 DRIFT_MEMORY = 10.0  # [s] over which the size of the rest is known
@@ -157,6 +158,7 @@ class FrictionFilter(NamedTuple):
     speed: float  # [m/s] then
     stroke: float  # [m] way in this direction so far
     longest: float  # [m] way in one direction before
+    gradient: float  # [N/m] g at the end of the direction before
     strayed: float  # [N] what readings in this direction have added to the offset: it may be friction until the next
     friction: float  # [N] by the law then
     friction_std: float  # [N] of the friction then
@@ -175,6 +177,7 @@ NOT_BEGUN = FrictionFilter(
     speed=0.0,
     stroke=0.0,
     longest=SHORTEST_STROKE,
+    gradient=0.0,
     strayed=0.0,
     friction=0.0,
     friction_std=0.0,
@@ -197,6 +200,7 @@ class Reading(NamedTuple):
     way: float  # [m] from the reading before to this one
     friction: float  # [N] f of the law, > 0
     friction_std: float  # [N] of a new reading, by the seal file
+    loaded: float = 0.0  # [N^2] square of a sudden change of the force sum in the rest before: it may be a load
 
 
 @compilable
@@ -298,13 +302,14 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
     moved = elapsed if elapsed < LONGEST_STEP else LONGEST_STEP
     kept, law = REMAINDER_TIME / (REMAINDER_TIME + elapsed), reading.friction
     fits = MISFIT_RANGE / (MISFIT_RANGE + 2.0 * abs(law - known.friction) / (law + known.friction))
-    stroke, longest, strayed = abs(reading.way), known.longest, 0.0
+    before = known.terms
+    stroke, longest, gradient, strayed = abs(reading.way), known.longest, before.gradient, 0.0
     if reading.direction == known.direction:
         stroke += known.stroke
-        strayed = known.strayed
+        gradient = known.gradient
+        strayed = known.strayed + reading.way * (before.gradient - gradient)
     elif known.stroke > longest:
         longest = known.stroke
-    before = known.terms
     offset = before.offset + reading.way * before.gradient
     terms = Terms(
         before.scale, before.coulomb, before.viscous, before.asymmetry, offset, before.gradient,
@@ -317,6 +322,12 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
     gains = _gains(covariance, reading)
     spread = expected(gains, reading)
     variance = spread + noise * noise
+    surprise = innovation * innovation
+    if OUTLIER * OUTLIER * variance < surprise < LOADED * reading.loaded:
+        covariance = replace(covariance, bb=covariance.bb + surprise)
+        gains = _gains(covariance, reading)
+        spread = expected(gains, reading)
+        variance = spread + noise * noise
 
     outliers, steps = _outliers(known, reading.direction, terms, innovation, variance)
     unexplained = _followed(
@@ -341,6 +352,7 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
         abs(reading.velocity),
         stroke,
         longest,
+        gradient,
         strayed + terms.offset - offset if longest > SHORTEST_STROKE else 0.0,
         reading.friction,
         std,

@@ -147,7 +147,7 @@ class Textbook:
         self.covariance = transition @ self.covariance @ transition.T + np.diag(added)
 
     def update(self, reading: Reading) -> None:
-        _, force, direction, velocity, way, law, _ = reading
+        _, force, direction, velocity, way, law, _, _ = reading
         elapsed = min(max((reading.stamp - self.stamp) * 1e-9, 0.0), 3600.0)
         self.stamp = reading.stamp
         moved = min(elapsed, LONGEST_STEP)
@@ -423,6 +423,27 @@ def test_a_load_step_is_no_friction_once_there_was_a_reversal_and_is_doubted_bef
             assert abs(missed) < 0.05 * law
     assert any(stepped)
     assert state.terms.offset == pytest.approx(share * law, abs=0.1 * law)
+
+
+@pytest.mark.parametrize('share', [0.5, 1.0, 2.0])
+def test_a_load_that_came_at_rest_is_no_friction_at_the_next_reversal(share):
+    """The reversal alone would make half of it friction; a sudden change at rest says that it is a load."""
+    machine, start = Machine(), 20.0
+    law = machine.frictions[0]
+    state, loaded = after(readings(machine, start)), machine._replace(terms=LAW._replace(offset=share * law))
+    first, *others = (one for one in readings(loaded, start + 1.0) if one.stamp >= start * SECOND)
+    for reading in (first._replace(loaded=(share * law) ** 2), *others):
+        state = updated(state, reading)
+        assert magnitude(state, machine, reading.direction) == pytest.approx(law, rel=0.1)
+        assert not state.outliers.is_stepped
+    assert state.terms.offset == pytest.approx(share * law, abs=0.1 * law)
+
+
+def test_a_change_of_the_force_sum_at_rest_is_no_load_if_the_next_motion_needs_none():
+    machine, start = Machine(), 20.0
+    state = after(readings(machine, start))
+    first = next(one for one in readings(machine, start + 1.0) if one.stamp >= start * SECOND)
+    assert updated(state, first._replace(loaded=machine.frictions[0] ** 2)) == updated(state, first)
 
 
 def test_noise_of_the_force_sum_is_no_uncertainty_of_the_friction():
