@@ -1,7 +1,6 @@
 """Real-time priority for a node in a control loop on a shared machine."""
 
 import os
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 
@@ -19,17 +18,3 @@ def take_realtime_priority(priority: int) -> None:
         hint = f'give the user an rtprio limit of {priority} (/etc/security/limits.conf) or the process CAP_SYS_NICE'
         reason = f'realtime_priority = {priority} is not granted: {error}'
         raise ValueError(f'{reason}: {hint}, or set realtime_priority to 0') from None
-
-
-def realtime_granted() -> bool:
-    """Whether the system grants this user a real-time priority; a temporary thread tries it."""
-    with ThreadPoolExecutor(1) as pool:
-        return pool.submit(_try_priority).result()
-
-
-def _try_priority() -> bool:
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
-    except (OSError, AttributeError):
-        return False
-    return True
