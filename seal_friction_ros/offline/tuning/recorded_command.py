@@ -1,47 +1,17 @@
 """Command of a controller in a bag, and the gain from force to command (`core.tuning.output_gain`)."""
 
-from functools import partial
-
 import numpy as np
 
 from seal_friction_ros.core.foundation.errors import named_errors
-from seal_friction_ros.core.messages.blocks import Numbers
 from seal_friction_ros.core.messages.fields import Reader
 from seal_friction_ros.core.messages.layouts import NUMBER_TYPE, NUMBERS_TYPE
 from seal_friction_ros.core.tuning.output_gain import CommandRecord, OutputGain, output_gain
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings
 from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag
 from seal_friction_ros.offline.bags.bag import BagError, read_definitions
-from seal_friction_ros.offline.bags.columns import Block, Held, Wanted, collected, extend, growing, wanted_of
+from seal_friction_ros.offline.bags.columns import Wanted, read_velocity_rows
 
 _FIELDS = {NUMBER_TYPE: 'data', NUMBERS_TYPE: 'data[0]'}
-_HELD = {'command': 1, 'pressure': 2, 'position': 1}
-
-
-class _CommandCollector:
-    """Each velocity sample with the newest command, pressures and position before it."""
-
-    def __init__(self, reader: Reader) -> None:
-        self._reader = reader
-        self._held = Held(_HELD)
-        self.columns = growing(2 + sum(_HELD.values()))
-
-    def add(self, block: Block) -> None:
-        """Take a row for each velocity: its stamp [s], itself, and what holds then."""
-        commands = [(place, number) for place, _, number in block.decoded('command', self._number)]
-        places, numbers = np.array(commands).reshape(-1, 2).T
-        found = {name: block.of(name) for name in ('pressure', 'position')}
-        found['command'] = Numbers(places.astype(np.int64), places.astype(np.int64), numbers[np.newaxis])
-        velocities = block.of('velocity')
-        held = self._held.at(velocities.places, found)
-        extend(self.columns, np.array([velocities.stamps * 1e-9, velocities.numbers[0], *held]))
-
-    def _number(self, data: bytes) -> float:
-        """The command of a message; ValueError if it is malformed or empty."""
-        (number,) = self._reader.read(data).numbers
-        if number is None:
-            raise ValueError('the array is empty')
-        return number
 
 
 def read_output_gain(source: ActuatorBag, topic: str, known: RecordedAxisSettings) -> OutputGain:
@@ -59,8 +29,17 @@ def read_output_gain(source: ActuatorBag, topic: str, known: RecordedAxisSetting
         raise BagError(f'{bag}: the command {topic} {what}: it has to be {NUMBER_TYPE} or {NUMBERS_TYPE}')
     (definition,) = read_definitions(bag, [kind]).values()
     reader = Reader(definition, kind, [_FIELDS[kind]])
-    wanted = {**wanted_of(source, ('velocity', 'pressure', 'position')), 'command': Wanted(topic, kind)}
-    columns = np.array(collected(source, wanted, partial(_CommandCollector, reader)).columns)
-    time, velocity, command, a, b, position = columns[:, np.isfinite(columns[2:5]).all(axis=0)]
+
+    def number_of(data: bytes) -> float:
+        """The command of a message; ValueError if it is malformed or empty."""
+        (number,) = reader.read(data).numbers
+        if number is None:
+            raise ValueError('the array is empty')
+        return number
+
+    rows = read_velocity_rows(source, also={'command': (Wanted(topic, kind), number_of)})
+    are_told = np.isfinite(rows.columns[[1, 2, -1]]).all(axis=0)
+    velocity, a, b, _, position, *_, command = rows.columns[:, are_told]
+    time = np.asarray(rows.stamps[are_told] * 1e-9, np.float64)
     with named_errors(f'{bag}: {topic}', raised=BagError):
         return output_gain(CommandRecord(time, command, known.area_a * a - known.area_b * b, position, velocity))
