@@ -299,7 +299,7 @@ def _rate_text(found: Mapping[str, Any]) -> str:
 
 
 def run_task(tool: Tool, task: Mapping[str, Any]) -> int:
-    """Run a task, ``action`` (list, hz, echo, param, call, record) and arguments; print its result, return the exit code.
+    """Run a task, ``action`` (list, hz, echo, param, call, record) and arguments; print its result; the exit code.
 
     ValueError: a name is not there, or a value is not valid.
     """

@@ -44,10 +44,7 @@ def add_parser(commands: Any) -> None:
 _LIMITS: dict[str, tuple[str, cli.Settings]] = {
     '--scale-low': ('alarm below this scale (0.6)', {'type': cli.non_negative, 'default': 0.6}),
     '--scale-high': ('alarm above this scale (1.5)', {'type': cli.non_negative, 'default': 1.5}),
-    '--breakaway': (
-        'alarm above this starting force over the friction (2.5)',
-        {'type': cli.non_negative, 'default': 2.5},
-    ),
+    '--breakaway': ('alarm above this start over the friction (2.5)', {'type': cli.non_negative, 'default': 2.5}),
     '--noise': ('alarm above this residual over the friction (0.3)', {'type': cli.non_negative, 'default': 0.3}),
 }
 

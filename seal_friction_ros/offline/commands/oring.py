@@ -19,13 +19,10 @@ def add_parser(commands: Any) -> None:
     cli.add_file(parser, 'case', 'oring', 'case file', metavar='CASE')
     help_text = 'gauge pressures, instead of those in the file'
     parser.add_argument('--pressures', type=float, nargs='+', default=(), metavar='PA', help=help_text)
-    help_text = 'measured sliding friction of one seal, in SI or with units; repeat it for several'
-    reading = cli.quantities('Pa', 'm/s', 'N')
-    metavar = 'PRESSURE,SPEED,FRICTION'
-    parser.add_argument('--reading', action='append', default=[], type=reading, metavar=metavar, help=help_text)
+    cli.add_shared(parser, '--reading')
     help_text = 'seal file of another ring of the same rubber, wall and lubricant, for its shear law'
     cli.add_file(parser, '--law-from', 'seals', help_text, metavar='SEAL')
-    cli.add_film(parser)
+    cli.add_shared(parser, '--film')
     cli.add_target(parser, '--out', SEAL_FILE, metavar='SEAL.yaml', help='seal file to write')
     cli.add_page(parser, '--report', required=False)
     cli.add_shared(parser, '--uncertain', '--seed')

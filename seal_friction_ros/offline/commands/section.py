@@ -19,25 +19,13 @@ def add_parser(commands: Any) -> None:
     parser.add_argument('drawing', metavar='SHAPE|FILE', help=text)
     cli.add_options(parser, _OPTIONS)
     parser.add_argument('--mirrored', action='store_true', help='swap the inner and the outer side of the section')
-    metavar = 'PRESSURE,SPEED,FRICTION'
-    reading = cli.quantities('Pa', 'm/s', 'N')
-    text = 'measured sliding friction of one seal, in SI or with units; repeat it for several'
-    parser.add_argument('--reading', action='append', default=[], type=reading, metavar=metavar, help=text)
-    cli.add_film(parser)
+    cli.add_shared(parser, '--reading', '--film')
     cli.add_target(parser, '--out', SEAL_FILE, metavar='SEAL.yaml', help='seal file to write')
     cli.add_page(parser, '--report', required=False)
 
 
-def _length(text: str) -> float:
-    return cli.quantities('m')(text)[0]
-
-
-def _pressure(text: str) -> float:
-    return cli.quantities('Pa')(text)[0]
-
-
 def _diameter(what: str, **settings: Any) -> tuple[str, cli.Settings]:
-    return f'{what}, in m or with a unit', {'type': _length, 'metavar': 'D', **settings}
+    return f'{what}, in m or with a unit', {'type': cli.quantity('m'), 'metavar': 'D', **settings}
 
 
 _OPTIONS: dict[str, tuple[str, cli.Settings]] = {
@@ -51,7 +39,7 @@ _OPTIONS: dict[str, tuple[str, cli.Settings]] = {
     '--corner-radius': _diameter(
         'radius of the corners that face the sliding wall; default: 2 %% of the height, of a drawing as drawn'
     ),
-    '--pressure': ('gauge, in Pa or with a unit', {'type': _pressure, 'nargs': '+', 'required': True, 'metavar': 'P'}),
+    '--pressure': cli.PRESSURE,
     '--hardness': ('of the rubber, Shore A, default 70', {'type': float, 'default': 70.0, 'metavar': 'A'}),
     '--test': ('tension test of the rubber: CSV (strain [1], stress [MPa])', {'type': Path, 'metavar': 'FILE'}),
     '--model': ('of the rubber of --test, default yeoh', {'choices': ('mooney', 'yeoh', 'ogden'), 'default': 'yeoh'}),
