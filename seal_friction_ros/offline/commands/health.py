@@ -100,8 +100,7 @@ def run_fleet(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.core.estimation.findings import GOOD
     from seal_friction_ros.offline.bags.find_bags import find_bags
     from seal_friction_ros.offline.replay.bag_summary import DIFFERENT, summaries
-    from seal_friction_ros.offline.reports.fleet_report import judged, rigs_of, write_fleet_report
-    from seal_friction_ros.offline.reports.fleet_table import write_fleet_table
+    from seal_friction_ros.offline.reports.fleet_report import judged, rigs_of, write_fleet_report, write_fleet_table
     from seal_friction_ros.packages import needed
 
     if arguments.parquet:
