@@ -19,14 +19,13 @@ from seal_friction_ros.core.identification.admission import MALFORMED, NO_VELOCI
 from seal_friction_ros.core.machine.gauge_or_absolute import Lowest, pressure_remarks
 from seal_friction_ros.core.machine.machine import Machine, MachineActuator, MachineState
 from seal_friction_ros.core.messages.coder import encode, encode_text, type_of
-from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, FORCE_TYPE, INPUTS, PRESSURE_TYPE, VELOCITY_TYPE
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, FORCE_TYPE, PRESSURE_TYPE, VELOCITY_TYPE
 from seal_friction_ros.core.messages.records import Input, Position, Pressure, ServoReference
+from seal_friction_ros.core.servo.tracking import tracking_rms
 from seal_friction_ros.offline.bags import bag as rosbag
 from seal_friction_ros.offline.bags.actuator_bag import no_velocity, sources_of
-from seal_friction_ros.offline.bags.mapped_bag import MappingFile, Translation, lacking, machine_in
+from seal_friction_ros.offline.bags.mapped_bag import LAST_PART, MappingFile, Translation, lacking, machine_in
 from seal_friction_ros.offline.work.progress import counted, progress
-
-_TOPICS = {type_name: f'/{topic}' for topic, type_name in INPUTS.items()}
 
 
 class ActuatorImport(NamedTuple):
@@ -97,8 +96,8 @@ class _Track:
         if len(wanted) < 2:
             return None
         at = np.interp(measured[:, 0], wanted[:, 0], wanted[:, 1], left=np.nan, right=np.nan)
-        error = (measured[:, 1] - at)[np.isfinite(measured[:, 1] - at)]
-        return float(np.sqrt(np.mean(error**2))) if len(error) else None
+        known = np.isfinite(measured[:, 1] - at)
+        return tracking_rms(at[known], measured[known, 1]) if known.any() else None
 
 
 def _write(
@@ -140,18 +139,19 @@ def _write(
                     if kind == VELOCITY_TYPE and awaited[number]:
                         early[number] += 1
                         continue
-                    writers[number].write(_TOPICS[kind], kind, message.log_time, encode(record, frame_id))
-                    counts[number][_TOPICS[kind]] += 1
+                    topic = f'/{LAST_PART[kind]}'
+                    writers[number].write(topic, kind, message.log_time, encode(record, frame_id))
+                    counts[number][topic] += 1
                     tracks[number].take(record)
                     if isinstance(record, Pressure):
                         lowest[number] = lowest[number].after(record)
     said = [
         text
         for (number, kind), one in repairs.items()
-        for text in one.said(f'{machine.actuators[number].name}: the stamp of {_TOPICS[kind].lstrip("/")}')
+        for text in one.said(f'{machine.actuators[number].name}: the stamp of {LAST_PART[kind]}')
     ]
     accounts = [
-        _account(bag, one, read, translation.malformed, early[number], counts[number][_TOPICS[VELOCITY_TYPE]])
+        _account(bag, one, read, translation.malformed, early[number], counts[number][rosbag.VELOCITY_TOPIC])
         for number, one in enumerate(machine.actuators)
     ]
     return counts, [*lacking(missing), *said], lowest, tracks, accounts

@@ -28,6 +28,7 @@ from seal_friction_ros.files import default_configuration, load_configuration, l
 from seal_friction_ros.offline.bags import bag as rosbag
 from seal_friction_ros.offline.bags.actuator_bag import (
     ANSWER_TOPICS,
+    MADE,
     RECORDED,
     TYPES,
     ActuatorBag,
@@ -258,7 +259,7 @@ def answered_anew(
 ) -> tuple[ActuatorBag, Iterator[rosbag.BagMessage]]:
     """An actuator with the topics of new answers, and its messages with these answers; arguments as of `Replay`."""
     replayed = Replay(actuator, override)
-    answers = {_FIELDS[kind]: topic for topic, kind in replayed.answers.items()}
+    answers = {MADE[kind]: topic for topic, kind in replayed.answers.items()}
     topics = actuator.topics._replace(configuration=replayed.configuration, **answers)
     kept = (message for step in replayed.steps() for message in replayed.kept_of(step))
     return actuator._replace(topics=topics), kept
@@ -273,9 +274,6 @@ def estimated_run(
         return read_run(bag, namespace, mapping)
     source, messages = answered_anew(actuator, override)
     return collected(source, wanted_of_run(source), RunCollector, messages=messages).run(source)
-
-
-_FIELDS = {layouts.ESTIMATE_TYPE: 'estimate', layouts.FEEDFORWARD_TYPE: 'feedforward'}
 
 
 def count_messages(topics: Mapping[str, rosbag.TopicInfo]) -> int:
