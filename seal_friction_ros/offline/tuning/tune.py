@@ -5,7 +5,7 @@ axis gives the same bytes.
 """
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -69,6 +69,16 @@ class TuningTask(NamedTuple):
         limit = f'force_limit: {now:g} N (was {was:g} N): {FORCE_MARGIN:g} times the largest friction found.'
         return (limit, f'Warning: {PLACEHOLDER_WARNING}.') if self.has_placeholder else (limit,)
 
+    def numbers(self, found: TunedFeedForward[Any], of_case: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:
+        """Numbers of any tuning for JSON, in SI units; ``of_case`` gives those of the outcome of a case."""
+        return {
+            'largest_friction': found.largest_friction,
+            'placeholder_seals': self.has_placeholder,
+            'parameters': asdict(found.feedforward),
+            'better_in_every_case': found.better_in_every_case,
+            'robustness': [{'friction_error': f, 'delay_error': d} | of_case(outcome) for f, d, outcome in found.cases],
+        }
+
 
 class RecordedTrack(NamedTuple):
     """Reference and position of the rod of a recorded axis [m], shape (n,); NaN where they are unknown."""
@@ -131,20 +141,12 @@ class SimulatorTuning:
         found = self.found
         return {
             'source': 'simulator',
-            'largest_friction': found.largest_friction,
-            'placeholder_seals': self.task.has_placeholder,
-            'parameters': asdict(found.feedforward),
+            **self.task.numbers(found, lambda one: {name: getattr(one, name) for name in PERFORMANCE}),
             'merit': found.merit,
             **{f'{name}_without': getattr(found.without, name) for name in PERFORMANCE},
             **{f'{name}_with': getattr(found.nominal, name) for name in PERFORMANCE},
             'largest_force': found.nominal.largest_force,
             'largest_force_rate': found.nominal.largest_force_rate,
-            'better_in_every_case': found.better_in_every_case,
-            'robustness': [
-                {'friction_error': friction_error, 'delay_error': delay_error}
-                | {name: getattr(performance, name) for name in PERFORMANCE}
-                for friction_error, delay_error, performance in found.cases
-            ],
             'plants': [
                 {'plant': plant, 'without': was._asdict(), 'with': now._asdict()} for plant, was, now in self.plants
             ],
@@ -191,9 +193,7 @@ class BagTuning:
         return {
             'source': 'bag',
             'bag': self.bag,
-            'largest_friction': found.largest_friction,
-            'placeholder_seals': self.task.has_placeholder,
-            'parameters': asdict(found.feedforward),
+            **self.task.numbers(found, lambda left: {'residual': left._asdict()}),
             'told_by_bag': found.identified,
             **{f'{name}_{which}': None for name in PERFORMANCE for which in ('without', 'with')},
             'residual_without': found.without._asdict(),
@@ -203,11 +203,6 @@ class BagTuning:
             'mass': law.mass,
             'mass_is_fitted': law.mass_is_fitted,
             'force_offset': law.offset,
-            'better_in_every_case': found.better_in_every_case,
-            'robustness': [
-                {'friction_error': friction_error, 'delay_error': delay_error, 'residual': left._asdict()}
-                for friction_error, delay_error, left in found.cases
-            ],
             **self.track.numbers(),
             **law.samples.numbers,
             'settings': asdict(self.known),
