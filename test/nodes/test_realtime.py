@@ -6,12 +6,12 @@ import sys
 
 import pytest
 
-from seal_friction_ros.nodes.realtime import take_realtime_priority
+from seal_friction_ros.nodes.managed_node import take_realtime_priority
 from seal_friction_ros.offline.work.computer import realtime_granted
 
 RUN = """
 import os, threading, time
-from seal_friction_ros.nodes.realtime import take_realtime_priority
+from seal_friction_ros.nodes.managed_node import take_realtime_priority
 early = threading.Thread(target=time.sleep, args=(5,), daemon=True); early.start()
 take_realtime_priority(7)
 late = threading.Thread(target=time.sleep, args=(5,), daemon=True); late.start()

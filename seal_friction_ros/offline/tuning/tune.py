@@ -25,19 +25,21 @@ from seal_friction_ros.core.foundation.units import MM, MS, UM
 from seal_friction_ros.core.identification import admission
 from seal_friction_ros.core.messages import layouts
 from seal_friction_ros.core.messages.blocks import Numbers
+from seal_friction_ros.core.messages.fields import Reader
 from seal_friction_ros.core.messages.records import ServoReference
 from seal_friction_ros.core.servo import simulator_options as simulator
 from seal_friction_ros.core.servo.closed_loop import IDEAL_SENSORS, Axis, AxisSensors
 from seal_friction_ros.core.servo.sensors import SensorSettings
 from seal_friction_ros.core.servo.tracking import tracking_peak, tracking_rms
 from seal_friction_ros.core.tuning.other_plants import PlantOutcome, on_plants
+from seal_friction_ros.core.tuning.output_gain import CommandRecord, OutputGain, output_gain
 from seal_friction_ros.core.tuning.recorded_axis import RecordedTuning, Recording, tune_recorded_axis
 from seal_friction_ros.core.tuning.settings import FORCE_MARGIN, RecordedAxisSettings, TunedFeedForward, TuningSettings
 from seal_friction_ros.core.tuning.simulated_axis import MOST_CANDIDATES, Tuning, TuningProblem, tune
 from seal_friction_ros.files import default_configuration, read_parameters
 from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag
-from seal_friction_ros.offline.bags.bag import BagError
-from seal_friction_ros.offline.bags.columns import Block, collected
+from seal_friction_ros.offline.bags.bag import BagError, read_definitions
+from seal_friction_ros.offline.bags.columns import Block, Wanted, collected, read_velocity_rows
 from seal_friction_ros.offline.bags.recorded_run import RunCollector, wanted_of_run
 from seal_friction_ros.offline.replay.replay import answered_anew
 from seal_friction_ros.offline.work.atomic_file import write_whole
@@ -365,6 +367,42 @@ def _conditioned(settings: EstimatorSettings, references: Sequence[Numbers]) -> 
             conditioned = condition_reference(conditioned, wanted)
         moved.append((conditioned.velocity.velocity, conditioned.acceleration))
     return stamps, np.array(moved).reshape(-1, 2).T
+
+
+# -- gain from force to command ----------------------------------------------------------------------------------------
+
+_COMMAND_FIELDS = {layouts.NUMBER_TYPE: 'data', layouts.NUMBERS_TYPE: 'data[0]'}
+
+
+def read_output_gain(source: ActuatorBag, topic: str, known: RecordedAxisSettings) -> OutputGain:
+    """Gain from force to the command on a topic, a `std_msgs/Float64` or `Float64MultiArray`.
+
+    The bag has the command, pressures, velocity and, if measured, position; the areas of both chambers are ``known``.
+    BagError: the bag lacks something, or cannot tell the gain.
+    """
+    if not (known.area_a and known.area_b):
+        raise BagError(f'{topic}: give --area-a and --area-b [m2]: the gain needs the force of the pressures')
+    bag = source.path
+    kind = source.infos[topic].type_name if topic in source.infos else ''
+    if kind not in _COMMAND_FIELDS:
+        what = f'is {kind}' if kind else 'is not in it'
+        raise BagError(f'{bag}: the command {topic} {what}: it has to be {" or ".join(_COMMAND_FIELDS)}')
+    (definition,) = read_definitions(bag, [kind]).values()
+    reader = Reader(definition, kind, [_COMMAND_FIELDS[kind]])
+
+    def number_of(data: bytes) -> float:
+        """The command of a message; ValueError if it is malformed or empty."""
+        (number,) = reader.read(data).numbers
+        if number is None:
+            raise ValueError('the array is empty')
+        return number
+
+    rows = read_velocity_rows(source, also={'command': (Wanted(topic, kind), number_of)})
+    are_told = np.isfinite(rows.columns[[1, 2, -1]]).all(axis=0)
+    velocity, a, b, _, position, *_, command = rows.columns[:, are_told]
+    time = np.asarray(rows.stamps[are_told] * 1e-9, np.float64)
+    with named_errors(f'{bag}: {topic}', raised=BagError):
+        return output_gain(CommandRecord(time, command, known.area_a * a - known.area_b * b, position, velocity))
 
 
 # -- parameter file ---------------------------------------------------------------------------------------------------
