@@ -121,18 +121,9 @@ def read_bag(
         seals: As of `Estimator`. With ``seals`` or ``params``, and of a bag without estimates, they are made anew.
         params: ROS parameter file of the estimator.
     """
-    from seal_friction_ros.offline.bags.actuator_bag import open_actuator
-    from seal_friction_ros.offline.bags.columns import collected
-    from seal_friction_ros.offline.bags.recorded_run import RunCollector, read_run, wanted_of_run
-    from seal_friction_ros.offline.replay.replay import answered_anew, chosen_configuration
+    from seal_friction_ros.offline.replay.replay import chosen_configuration, estimated_run
 
-    given, override = _mapping(mapping), chosen_configuration(params, seals)
-    actuator = open_actuator(Path(bag), namespace, given)
-    if override is None and actuator.topics.estimate:
-        run = read_run(actuator.path, namespace, given)
-    else:
-        source, messages = answered_anew(actuator, override)
-        run = collected(source, wanted_of_run(source), RunCollector, messages=messages).run(source)
+    run = estimated_run(Path(bag), namespace, _mapping(mapping), chosen_configuration(params, seals))
     columns = Columns({name: values for name, values in vars(run).items() if isinstance(values, np.ndarray)})
     columns.start = run.start
     if run.configurations:

@@ -28,7 +28,6 @@ from harness.processes import free_domain, play_live
 
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.files import config_path
-from seal_friction_ros.nodes.realtime import realtime_granted
 from seal_friction_ros.offline.bags.import_bag import convert_bag
 from seal_friction_ros.offline.bags.import_log import convert_log
 from seal_friction_ros.offline.bags.import_thesis import import_thesis
@@ -38,6 +37,7 @@ from seal_friction_ros.offline.replay.replay import replay
 from seal_friction_ros.offline.reports.bag_report import write_report
 from seal_friction_ros.offline.reports.page import ReportSummary
 from seal_friction_ros.offline.reports.servo_charts import write_servo_charts
+from seal_friction_ros.offline.work.computer import realtime_granted
 
 ROOT = Path(__file__).parents[1]
 OUT = ROOT / 'build' / 'demo'

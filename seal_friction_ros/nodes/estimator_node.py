@@ -479,7 +479,7 @@ class EstimatorNode(ManagedNode):
         """Take a message, and those that wait behind a late one; arguments after the name as of `with_info`."""
         data, info = message if info is None else (message, info)
         source = info['source_timestamp']
-        lateness = time.time_ns() - source if source else 0
+        lateness = _lateness(source)
         if lateness > _BACKLOG:
             self._sorts_until = time.perf_counter_ns() + _SORTING
         if not self._sorts_until:

@@ -1,25 +1,27 @@
 """Base class of the nodes: lifecycle, parameters from dataclasses, diagnostics once a second."""
 
+import dataclasses
 import inspect
+import os
 import re
 import time
 from collections.abc import Callable, Collection, Mapping
 from difflib import get_close_matches
 from importlib import import_module
+from pathlib import Path
 from typing import Any, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy.clock import Clock, ClockType
-from rclpy.exceptions import ParameterException
+from rclpy.exceptions import ParameterException, ParameterUninitializedException
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from seal_friction_ros.core.estimation.node_options import FEEDFORWARD_PREFIX, StartOptions
-from seal_friction_ros.core.foundation.parameters import ParameterGroup
+from seal_friction_ros.core.foundation.parameters import Meaning, ParameterGroup, meanings
 from seal_friction_ros.files import unknown_parameters
-from seal_friction_ros.nodes.parameters import declare, numbers, read, with_declared_type
-from seal_friction_ros.nodes.realtime import take_realtime_priority
 
 Record = TypeVar('Record')
 
@@ -37,6 +39,22 @@ def message_class(type_name: str) -> Any:
         raise ValueError(f'{type_name} is not installed: install the package {package}') from None
 
 
+def take_realtime_priority(priority: int) -> None:
+    """Schedule every present and future thread of this process with SCHED_FIFO, 1 (lowest) to 99; 0 changes nothing.
+
+    ValueError: the system does not grant the priority.
+    """
+    if not priority:
+        return
+    try:
+        for thread in Path('/proc/self/task').iterdir():
+            os.sched_setscheduler(int(thread.name), os.SCHED_FIFO, os.sched_param(priority))
+    except (OSError, AttributeError) as error:
+        hint = f'give the user an rtprio limit of {priority} (/etc/security/limits.conf) or the process CAP_SYS_NICE'
+        reason = f'realtime_priority = {priority} is not granted: {error}'
+        raise ValueError(f'{reason}: {hint}, or set realtime_priority to 0') from None
+
+
 def _may_limit_force(unknown: str, declared: Collection[str]) -> bool:
     """Whether who gave an unknown parameter may have meant one of the feed-forward: its off switch, for example.
 
@@ -52,6 +70,69 @@ def status_of(level: bytes, message: str, values: Mapping[str, object] | None = 
     """Status of a part of a node, with values by name and unit."""
     pairs = [KeyValue(key=key, value=str(value)) for key, value in (values or {}).items()]
     return DiagnosticStatus(level=level, message=message, values=pairs)
+
+
+def declare(node: Node, group: ParameterGroup) -> None:
+    """Declare the parameters of a group; a number may be given as a whole number.
+
+    rclpy.exceptions.ParameterException: an override has the wrong type or is out of bounds.
+    """
+    defaults = {field.name: field.default for field in dataclasses.fields(group.record_type)}
+    if group.defaults is not None:
+        defaults = {name: getattr(group.defaults, name) for name in defaults}
+    described, fixed = meanings(group.record_type), group.fixed()
+    for name, field in group.names().items():
+        default = defaults[field]
+        value = list(default) if isinstance(default, tuple) else default
+        descriptor = _descriptor(described[field], default, name not in fixed)
+        given = getattr(node, '_parameter_overrides', {}).get(name)
+        taken = given and with_declared_type(given, numbers(group))
+        if taken is given:
+            node.declare_parameter(name, value, descriptor)
+        else:
+            node.declare_parameter(name, taken.value, descriptor, ignore_override=True)
+
+
+def numbers(group: ParameterGroup) -> set[str]:
+    """Parameters of a group that are floating-point numbers."""
+    defaults = {field.name: field.default for field in dataclasses.fields(group.record_type)}
+    return {name for name, field in group.names().items() if isinstance(defaults[field], float)}
+
+
+def with_declared_type(parameter: Parameter, numbers: set[str]) -> Parameter:
+    """The parameter, a whole number as a floating-point number if it is one of ``numbers``.
+
+    ROS refuses ``ros2 param set NODE feedforward.force_limit 0`` otherwise, since 0 is an integer in YAML.
+    """
+    if parameter.name in numbers and parameter.type_ == Parameter.Type.INTEGER:
+        return Parameter(parameter.name, Parameter.Type.DOUBLE, float(parameter.value))
+    return parameter
+
+
+def read(node: Node, record_type: type[Record], prefix: str = '', **changed: Any) -> Record:
+    """Make the dataclass from the parameters of the node; ``changed`` overrides fields.
+
+    ValueError, in one line that names field, value and bound: a value is invalid.
+    """
+    try:
+        values = {name: changed.get(name, node.get_parameter(prefix + name).value) for name in meanings(record_type)}
+    except ParameterUninitializedException as error:  # an empty list has no type: rclpy treats it as not set
+        raise ValueError(f'{record_type.__name__}: a list is empty: {error}') from None
+    return record_type(**{name: tuple(v) if isinstance(v, list) else v for name, v in values.items()})
+
+
+def _descriptor(meaning: Meaning, default: Any, live: bool) -> ParameterDescriptor:
+    unit = f' [{meaning.unit}]' if meaning.unit else ''
+    descriptor = ParameterDescriptor(description=f'{meaning.description}{unit}')
+    if not live:
+        descriptor.additional_constraints = 'Can only change while the node is unconfigured.'
+    if meaning.lower is not None and meaning.upper is not None:
+        if isinstance(default, float):
+            bounds = FloatingPointRange(from_value=float(meaning.lower), to_value=float(meaning.upper))
+            descriptor.floating_point_range = [bounds]
+        else:
+            descriptor.integer_range = [IntegerRange(from_value=int(meaning.lower), to_value=int(meaning.upper))]
+    return descriptor
 
 
 class _SteadyTimer:

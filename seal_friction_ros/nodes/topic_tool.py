@@ -1,32 +1,39 @@
 """What ``seal_friction topics`` does: lists topics, measures rates, prints messages, sets parameters, calls services.
 
+For ``seal_friction new robot`` it records the topics of some types for a while.
+
 ros2cli is not on the package registry, and its Python packages need a sourced distribution: hence these few functions.
 """
 
 import json
 import sys
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import partial
 from importlib import import_module
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import rclpy
 import yaml
-from rclpy.node import Node
+from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from seal_friction_ros.core.foundation.parameters import meant
+from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.executor import run_tool
 from seal_friction_ros.nodes.graph_watch import full_name
 from seal_friction_ros.nodes.managed_node import message_class
+from seal_friction_ros.offline.bags.bag import BagError, BagWriter
 
 SUCCESS, REFUSED = 0, 1
 _NAME = 'seal_friction_topics'
 _LONGEST_ARRAY = 20  # numbers of a field that a person reads; JSON has all
+_NO_INPUTS = ('/rosout', '/parameter_events', '/transition_event', '/diagnostics')
+"""Ends of the topics that say nothing of a machine, as of a node that still compiles."""
 
 
 class NotThereError(ValueError):
@@ -125,6 +132,58 @@ class Tool:
         self.listen(name, take)
         self.spin(seconds or float('inf'), lambda: count is not None and shown >= count)
         return shown
+
+    # -- recording --
+
+    def record(self, types: Collection[str], seconds: float, out: Path) -> list[str]:
+        """Record every topic of some types (``package/msg/Name``) with best effort to a bag; the `silent` ones.
+
+        It ends ``seconds`` [s] after the first message. BagError: there is none, or the bag cannot be written.
+        """
+        messages: list[tuple[str, str, int, bytes]] = []
+        topics: set[str] = set()
+
+        def take(topic: str, kind: str, data: bytes) -> None:
+            messages.append((topic, kind, time.time_ns(), data))
+
+        def has_heard() -> bool:
+            """Subscribe to the topics that have appeared; whether there is a message."""
+            for topic, kind in self.topics().items():
+                if kind in types and topic not in topics:
+                    topics.add(topic)
+                    profile, taking = qos.best_effort(qos.STREAM), partial(take, topic, kind)
+                    self.node.create_subscription(message_class(kind), topic, taking, profile, raw=True)
+            return bool(messages)
+
+        if not self.spin(self._wait, has_heard):
+            heard = ', '.join(f'{topic} ({kind})' for topic, kind in self.topics().items())
+            hint = 'start the drivers, check ROS_DOMAIN_ID'
+            there = f'topics: {heard or "none"}; silent: {"; ".join(self.silent(topics)) or "none"}'
+            raise BagError(f'no message of a type that can be an input within {self._wait:g} s: {hint}; {there}')
+        self.spin(seconds, lambda: not has_heard())
+        with BagWriter(out) as writer:
+            for message in messages:
+                writer.write(*message)
+        return self.silent(topics - {topic for topic, *_ in messages})
+
+    def silent(self, topics: Collection[str]) -> list[str]:
+        """Those of the topics without a message that have a publisher, and nodes that publish nothing."""
+        found = []
+        for topic in sorted(topics):
+            publishers = sorted(full_name(end) for end in self.node.get_publishers_info_by_topic(topic))
+            found += [f'{topic} of {", ".join(publishers)}'] if publishers else []
+        for name, space in sorted(self.node.get_node_names_and_namespaces()):
+            if name != _NAME and not self._published(name, space):
+                found.append(f'node {space}/{name}'.replace('//', '/'))
+        return found
+
+    def _published(self, name: str, space: str) -> list[str]:
+        """Topics of a node that may be inputs."""
+        try:
+            topics = [topic for topic, _ in self.node.get_publisher_names_and_types_by_node(name, space)]
+        except NodeNameNonExistentError:  # it has just gone
+            return []
+        return [topic for topic in topics if not topic.endswith(_NO_INPUTS)]
 
     # -- parameters and services --
 
@@ -240,7 +299,7 @@ def _rate_text(found: Mapping[str, Any]) -> str:
 
 
 def run_task(tool: Tool, task: Mapping[str, Any]) -> int:
-    """Run a task, ``action`` (list, hz, echo, param or call) and arguments; print its result, return the exit code.
+    """Run a task, ``action`` (list, hz, echo, param, call, record) and arguments; print its result; the exit code.
 
     ValueError: a name is not there, or a value is not valid.
     """
@@ -261,6 +320,9 @@ def run_task(tool: Tool, task: Mapping[str, Any]) -> int:
     if action == 'echo':
         each = show if as_json else lambda value: show(value, f'{_yaml(value)}\n---')
         return SUCCESS if tool.echo(task['topic'], each, task.get('count'), task.get('seconds')) else REFUSED
+    if action == 'record':
+        print(*tool.record(task['types'], task['seconds'], Path(task['out'])), sep='\n')
+        return SUCCESS
     if action == 'call':
         response = plain(tool.call(task['service'], _mapping(task['request'])))
         show(response)

@@ -10,6 +10,7 @@ from seal_friction_ros.core.messages.coder import decode_text, encode, encode_te
 from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, INPUTS
 from seal_friction_ros.core.messages.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.offline.bags import bag as b
+from seal_friction_ros.offline.monitor.recorded_view import RecordedView
 from seal_friction_ros.offline.replay.replay import replay
 
 STEP = 10_000_000  # [ns]
@@ -68,3 +69,10 @@ def rewrite(source: Path, out: Path, change: Callable[[int, b.BagMessage], b.Bag
             if changed is not None:
                 writer.write(*changed)
     return out
+
+
+def read_whole(view: RecordedView) -> RecordedView:
+    """A view that has read its bag to the end."""
+    for _ in view.read():
+        pass
+    return view

@@ -15,6 +15,7 @@ from urllib.parse import urlsplit
 
 import pytest
 from harness.browser import chromium
+from harness.example_bags import read_whole
 from harness.live_graph import Probe
 from harness.monitor_process import SCRIPT, Monitor, check_page, monitor, press_off, shown
 from harness.moving_axis import MovingAxis, compensated
@@ -137,7 +138,7 @@ def test_a_machine_of_three_shows_each_actuator_and_off_takes_out_all_forces(tmp
         assert all(f'{name}.feedforward.scale = 0' in answer for name in NAMES)
         assert running.wait_for(lambda view: all(one['feedforward'] == 0.0 for one in view['actuators']))
         check_page(page, running.port)
-    recorded = RecordedView(tmp_path / 'bag').load()
+    recorded = read_whole(RecordedView(tmp_path / 'bag'))
     frame = recorded.view('', -1.0)
     assert [one['label'] for one in frame['actuators']] == [f'{name} (/machine_estimator)' for name in NAMES]
     assert all(one['feedforward'] == 0.0 for one in frame['actuators'])

@@ -6,11 +6,12 @@ import sys
 
 import pytest
 
-from seal_friction_ros.nodes.realtime import realtime_granted, take_realtime_priority
+from seal_friction_ros.nodes.managed_node import take_realtime_priority
+from seal_friction_ros.offline.work.computer import realtime_granted
 
 RUN = """
 import os, threading, time
-from seal_friction_ros.nodes.realtime import take_realtime_priority
+from seal_friction_ros.nodes.managed_node import take_realtime_priority
 early = threading.Thread(target=time.sleep, args=(5,), daemon=True); early.start()
 take_realtime_priority(7)
 late = threading.Thread(target=time.sleep, args=(5,), daemon=True); late.start()
@@ -32,5 +33,6 @@ def test_a_priority_that_the_system_does_not_grant_is_rejected_with_the_remedy(m
     monkeypatch.setattr(os, 'sched_setscheduler', refuse)
     with pytest.raises(ValueError, match=r'realtime_priority = 50 is not granted: .*CAP_SYS_NICE'):
         take_realtime_priority(50)
-    assert not realtime_granted()
     take_realtime_priority(0)
+    monkeypatch.setattr(sys, 'executable', '/bin/false')  # as a process that is refused
+    assert not realtime_granted()

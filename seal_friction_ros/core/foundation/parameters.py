@@ -1,6 +1,6 @@
 """Parameters declared once: frozen dataclasses whose fields carry default, unit, bounds and meaning.
 
-The check at construction, the check of a YAML file, the ROS parameter declaration (``nodes/parameters.py``) and the
+The check at construction, the check of a YAML file, the ROS parameter declaration (``nodes/managed_node.py``) and the
 tables in the docs follow from these fields.
 """
 

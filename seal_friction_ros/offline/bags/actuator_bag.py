@@ -30,7 +30,7 @@ from seal_friction_ros.offline.bags.mapped_bag import (
     machine_messages,
 )
 
-_OWN = {layouts.ESTIMATE_TYPE: 'estimate', layouts.FEEDFORWARD_TYPE: 'feedforward', layouts.TICK_TYPE: 'tick'}
+MADE = {layouts.ESTIMATE_TYPE: 'estimate', layouts.FEEDFORWARD_TYPE: 'feedforward', layouts.TICK_TYPE: 'tick'}
 """Message type that the node of a machine makes for each actuator -> field of `Topics`."""
 ANSWER_TOPICS = {layouts.ESTIMATE_TYPE: rosbag.ESTIMATE_TOPIC, layouts.FEEDFORWARD_TYPE: rosbag.FEEDFORWARD_TOPIC}
 """Message type of an answer -> topic, if the bag has no topic of that type."""
@@ -259,7 +259,7 @@ def _topics_of(actuator: MachineActuator, infos: Mapping[str, rosbag.TopicInfo],
     if has_mapping or layouts.MACHINE_TYPE in present.values():
         made |= {'estimate', 'feedforward'}
     if not has_mapping:
-        made |= {_OWN[kind] for topic, kind in present.items() if kind in _OWN and _is_of(actuator.name, topic)}
+        made |= {MADE[kind] for topic, kind in present.items() if kind in MADE and _is_of(actuator.name, topic)}
     names = {
         name: f'/{actuator.name}/{LAST_PART[kind]}' if name in made else ''
         for name, kind in zip(TYPES._fields, TYPES, strict=True)
@@ -308,7 +308,7 @@ class _OfActuator:
         if kind == layouts.CLOCK_TYPE:
             translation.follow(coder.decode_clock(message.data), message.log_time)
             return [message]
-        if kind in _OWN and _is_of(self._name, message.topic):
+        if kind in MADE and _is_of(self._name, message.topic):
             return [message._replace(topic=f'/{self._name}/{message.topic.rpartition("/")[2]}')]
         return [] if kind in coder.DECODERS else [message]
 

@@ -12,7 +12,7 @@ import shutil
 import sqlite3
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from datetime import UTC, datetime
 from functools import cache
 from itertools import islice
@@ -67,15 +67,9 @@ class DamagedError(BagError):
     """A bag whose files are not whole; ``seal_friction recover`` makes a bag of what can be read."""
 
 
-@contextmanager
-def named(bag: Path, message: BagMessage) -> Iterator[None]:
+def named(bag: Path, message: BagMessage) -> AbstractContextManager[None]:
     """Convert the error of a message to one that names it."""
-    try:
-        yield
-    except BagError:
-        raise
-    except ValueError as error:
-        raise BagError(f'{bag}: message on {message.topic} at {message.log_time} ns: {error}') from None
+    return named_errors(f'{bag}: message on {message.topic} at {message.log_time} ns', raised=BagError)
 
 
 def timed_name(name: str) -> str:

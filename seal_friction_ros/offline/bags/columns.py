@@ -9,6 +9,7 @@ from array import array
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
+from functools import partial
 from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -137,7 +138,7 @@ class VelocityRows(NamedTuple):
     received: IntArray  # [ns] log times, shape (n,)
     columns: FloatArray
     """shape (7, n), in the units of the messages: velocity, both pressures, force sum, position, temperature and its
-    variance; NaN before the first message"""
+    variance, then what was wanted ``also``; NaN before the first message"""
     configuration: Configuration | None  # the last one
     left_out: Mapping[str, int] = {}  # reason -> messages on the topic of the velocity that made none
 
@@ -147,11 +148,17 @@ def wanted_of(bag: ActuatorBag, names: Iterable[str]) -> dict[str, Wanted]:
     return {name: Wanted(getattr(bag.topics, name), getattr(TYPES, name)) for name in names}
 
 
-def read_velocity_rows(bag: ActuatorBag, *, bulk_from: int = BULK_FROM) -> VelocityRows:
+Also = Mapping[str, tuple[Wanted, Callable[[bytes], float]]]
+"""Name -> a topic of messages that are no inputs, and the number in one of them."""
+_NOTHING: Also = {}
+
+
+def read_velocity_rows(bag: ActuatorBag, *, also: Also = _NOTHING, bulk_from: int = BULK_FROM) -> VelocityRows:
     """Each velocity sample with what came newest of the other inputs before it; raises as `collected`."""
     wanted, malformed = wanted_of(bag, (*INPUTS, 'configuration')), Counter[str]()
+    wanted |= {name: one for name, (one, _) in also.items()}
     given = bag.messages(malformed=malformed) if bag.velocity_source else None
-    rows = collected(bag, wanted, _VelocityCollector, messages=given, bulk_from=bulk_from).rows()
+    rows = collected(bag, wanted, partial(_VelocityCollector, also), messages=given, bulk_from=bulk_from).rows()
     if given is None:
         return rows
     count, unread = bag.infos[bag.velocity_source].message_count, malformed[bag.velocity_source]
@@ -162,10 +169,11 @@ def read_velocity_rows(bag: ActuatorBag, *, bulk_from: int = BULK_FROM) -> Veloc
 class _VelocityCollector:
     """Rows of the blocks so far."""
 
-    def __init__(self) -> None:
-        self._held = Held(INPUTS)
+    def __init__(self, also: Also) -> None:
+        self._also = also
+        self._held = Held({**INPUTS, **dict.fromkeys(also, 1)})
         self._stamps, self._received = array('q'), array('q')
-        self._columns = growing(sum(INPUTS.values()))
+        self._columns = growing(sum(INPUTS.values()) + len(also))
         self._configuration: Configuration | None = None
 
     def add(self, block: Block) -> None:
@@ -173,6 +181,10 @@ class _VelocityCollector:
         for _, _, text in block.decoded('configuration', decode_text):
             self._configuration = parse_snapshot(text).configuration
         found = {name: block.of(name) for name in INPUTS}
+        for name, (_, number_of) in self._also.items():
+            numbers = np.array([(place, number) for place, _, number in block.decoded(name, number_of)]).reshape(-1, 2)
+            places = numbers[:, 0].astype(np.int64)
+            found[name] = Numbers(places, places, numbers[:, 1:].T)
         self._stamps.frombytes(found['velocity'].stamps.tobytes())
         self._received.frombytes(block.messages.received[found['velocity'].places].astype(np.int64).tobytes())
         extend(self._columns, self._held.at(found['velocity'].places, found))

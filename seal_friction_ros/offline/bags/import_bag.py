@@ -6,10 +6,11 @@ The records are those that the live node makes of the same messages (`core.machi
 
 from array import array
 from collections import Counter
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,14 +20,13 @@ from seal_friction_ros.core.identification.admission import MALFORMED, NO_VELOCI
 from seal_friction_ros.core.machine.gauge_or_absolute import Lowest, pressure_remarks
 from seal_friction_ros.core.machine.machine import Machine, MachineActuator, MachineState
 from seal_friction_ros.core.messages.coder import encode, encode_text, type_of
-from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, FORCE_TYPE, INPUTS, PRESSURE_TYPE, VELOCITY_TYPE
-from seal_friction_ros.core.messages.records import Input, Position, Pressure, ServoReference
+from seal_friction_ros.core.messages.layouts import CONFIGURATION_TYPE, FORCE_TYPE, PRESSURE_TYPE, VELOCITY_TYPE
+from seal_friction_ros.core.messages.records import Position, Pressure, ServoReference
+from seal_friction_ros.core.servo.tracking import tracking_rms
 from seal_friction_ros.offline.bags import bag as rosbag
 from seal_friction_ros.offline.bags.actuator_bag import no_velocity, sources_of
-from seal_friction_ros.offline.bags.mapped_bag import MappingFile, Translation, lacking, machine_in
+from seal_friction_ros.offline.bags.mapped_bag import LAST_PART, MappingFile, Translation, lacking, machine_in
 from seal_friction_ros.offline.work.progress import counted, progress
-
-_TOPICS = {type_name: f'/{topic}' for topic, type_name in INPUTS.items()}
 
 
 class ActuatorImport(NamedTuple):
@@ -48,123 +48,126 @@ def convert_bag(bag: Path, out: Path, mapping: MappingFile, also: Collection[str
     """
     machine, state = machine_in(bag, mapping)
     topics = rosbag.bag_topics(bag)
-    if absent := [topic for topic in also if topic not in topics]:
-        raise ValueError(f'{bag}: {absent[0]} is not in it; it has {", ".join(sorted(topics))}')
+    if unknown := [topic for topic in also if topic not in topics]:
+        raise ValueError(f'{bag}: {unknown[0]} is not in it; it has {", ".join(sorted(topics))}')
     several = len(machine.actuators) > 1
-    folders = {one.name: out / one.name if several else out for one in machine.actuators}
     if several and out.exists():
         raise rosbag.BagError(f'{out} exists already: not overwriting')
+    present = {topic: info.message_count for topic, info in topics.items() if info.message_count}
     try:
         with ExitStack() as stack:
-            writers = [stack.enter_context(rosbag.BagWriter(folder)) for folder in folders.values()]
-            present = {topic: info.message_count for topic, info in topics.items() if info.message_count}
-            counts, missing, lowest, tracks, accounts = _write(machine, state, bag, writers, present, also)
-            for one, samples in zip(machine.actuators, accounts, strict=True):
-                if not samples.used:
-                    raise ValueError(no_velocity(bag, one.name, missing))
-                samples.check()
+            writers = (rosbag.BagWriter(out / one.name if several else out) for one in machine.actuators)
+            parts = [
+                _Part(one, stack.enter_context(writer), _awaited(one, present))
+                for one, writer in zip(machine.actuators, writers, strict=True)
+            ]
+            lacked, samples = _write(machine, state, bag, parts, present, also)
     except BaseException:
         if several and out.is_dir() and not any(out.iterdir()):
             out.rmdir()
         raise
     absent = [f'{topic} is not in the bag' for topic in machine.plans if topic not in topics]
     found = {}
-    for one, count, low, track, samples in zip(machine.actuators, counts, lowest, tracks, accounts, strict=True):
-        pressures = (f'{one.name}: {text}' for text in pressure_remarks(mapping.file, one.mapping, low))
-        remarks = (*absent, *missing, *pressures, *samples.warnings)
-        found[one.name] = ActuatorImport(folders[one.name], dict(count), track.rms, remarks, samples)
+    for part, account in zip(parts, samples, strict=True):
+        name = part.actuator.name
+        pressures = (f'{name}: {text}' for text in pressure_remarks(mapping.file, part.actuator.mapping, part.lowest))
+        remarks = (*absent, *lacked, *pressures, *account.warnings)
+        found[name] = ActuatorImport(part.writer.path, dict(part.counts), part.tracking_rms(), remarks, account)
     return found
 
 
-class _Track:
-    """Wanted and measured position of an actuator."""
+@dataclass
+class _Part:
+    """What one actuator gets, while the bag is read."""
 
-    def __init__(self) -> None:
-        self._wanted = array('d')  # stamp [ns] and position [m] in turn: tuples take seven times the memory
-        self._measured = array('d')
+    actuator: MachineActuator
+    writer: rosbag.BagWriter
+    awaited: set[str]  # types of messages before which a velocity is left out
+    early: int = 0  # velocities that were
+    counts: Counter[str] = field(default_factory=Counter)  # topic -> messages
+    lowest: Lowest = field(default_factory=Lowest)  # pressures
+    repairs: dict[str, StampRepair] = field(default_factory=dict)  # message type -> its stamps
+    # Stamp [ns] and position [m] in turn: tuples take seven times the memory.
+    wanted: 'array[float]' = field(default_factory=lambda: array('d'))
+    measured: 'array[float]' = field(default_factory=lambda: array('d'))
 
-    def take(self, record: Input) -> None:
-        """Keep the position of a reference or of the rod."""
-        if isinstance(record, ServoReference):
-            self._wanted.extend((record.stamp, record.position))
-        elif isinstance(record, Position):
-            self._measured.extend((record.stamp, record.position))
+    def take(self, record: Any, frame_id: bytes, log_time: int) -> None:
+        """Write a record with a repaired stamp, its velocity from the first pressure and force sum on.
 
-    @property
-    def rms(self) -> float | None:
+        A recorder hears its topics one after the other, so the first messages of some are missing.
+        """
+        kind = type_of(record)
+        record = record._replace(stamp=self.repairs.setdefault(kind, StampRepair()).next(record.stamp, log_time))
+        self.awaited.discard(kind)
+        if kind == VELOCITY_TYPE and self.awaited:
+            self.early += 1
+            return
+        topic = f'/{LAST_PART[kind]}'
+        self.writer.write(topic, kind, log_time, encode(record, frame_id))
+        self.counts[topic] += 1
+        if isinstance(record, Pressure):
+            self.lowest = self.lowest.after(record)
+        elif isinstance(record, ServoReference | Position):
+            (self.measured if isinstance(record, Position) else self.wanted).extend((record.stamp, record.position))
+
+    def stamp_remarks(self) -> Iterator[str]:
+        """What was wrong with the stamps."""
+        for kind, repair in self.repairs.items():
+            yield from repair.said(f'{self.actuator.name}: the stamp of {LAST_PART[kind]}')
+
+    def tracking_rms(self) -> float | None:
         """Root of the mean square of measured minus wanted position at the same time [m]; None without both."""
-        wanted, measured = (np.array(part).reshape(-1, 2) for part in (self._wanted, self._measured))
+        wanted, measured = (np.array(part).reshape(-1, 2) for part in (self.wanted, self.measured))
         if len(wanted) < 2:
             return None
         at = np.interp(measured[:, 0], wanted[:, 0], wanted[:, 1], left=np.nan, right=np.nan)
-        error = (measured[:, 1] - at)[np.isfinite(measured[:, 1] - at)]
-        return float(np.sqrt(np.mean(error**2))) if len(error) else None
+        known = np.isfinite(measured[:, 1] - at)
+        return tracking_rms(at[known], measured[known, 1]) if known.any() else None
 
 
 def _write(
     machine: Machine,
     state: MachineState,
     bag: Path,
-    writers: list[rosbag.BagWriter],
+    parts: list[_Part],
     present: Mapping[str, int],
     also: Collection[str],
-) -> tuple[list[Counter[str]], list[str], list[Lowest], list[_Track], list[Account]]:
-    """Write what each actuator gets, its velocity from the first pressure and force sum on.
-
-    A recorder hears its topics one after the other, so the first messages of some are missing. Returns the number of
-    messages by topic, what messages lacked, and of each actuator its lowest pressures, its tracking and its samples.
-    """
-    lowest = [Lowest() for _ in machine.actuators]
-    tracks = [_Track() for _ in machine.actuators]
-    awaited = [_awaited(one, present) for one in machine.actuators]
-    counts: list[Counter[str]] = [Counter() for _ in machine.actuators]
-    missing, read, early = Counter[str](), Counter[str](), Counter[int]()
-    repairs: dict[tuple[int, str], StampRepair] = {}
+) -> tuple[list[str], list[Account]]:
+    """Write what each actuator gets; what was wrong with messages, and the samples of each. ValueError: too few."""
+    missing, read, is_begun = Counter[str](), Counter[str](), False
     translation = Translation(machine, state)
     with progress(f'import {bag.name}', sum(present.values())) as advance:
         used = {*machine.plans, *also}
         for message in (one for one in counted(rosbag.read_messages(bag), advance) if one.topic in used):
-            if not writers[0].message_count:
-                _write_configurations(machine, state, writers, message.log_time)
-            for writer in writers if message.topic in also else ():
-                writer.write(*message)
-            if message.topic not in machine.plans:
-                continue
-            read[message.topic] += 1
-            with rosbag.named(bag, message):
-                for number, record, frame_id in translation.records(message._replace(publish_time=None), missing):
-                    kind = type_of(record)
-                    stamp = repairs.setdefault((number, kind), StampRepair()).next(record.stamp, message.log_time)
-                    record = record._replace(stamp=stamp)  # noqa: PLW2901  the repaired one in its place
-                    awaited[number].discard(kind)
-                    if kind == VELOCITY_TYPE and awaited[number]:
-                        early[number] += 1
-                        continue
-                    writers[number].write(_TOPICS[kind], kind, message.log_time, encode(record, frame_id))
-                    counts[number][_TOPICS[kind]] += 1
-                    tracks[number].take(record)
-                    if isinstance(record, Pressure):
-                        lowest[number] = lowest[number].after(record)
-    said = [
-        text
-        for (number, kind), one in repairs.items()
-        for text in one.said(f'{machine.actuators[number].name}: the stamp of {_TOPICS[kind].lstrip("/")}')
-    ]
-    accounts = [
-        _account(bag, one, read, translation.malformed, early[number], counts[number][_TOPICS[VELOCITY_TYPE]])
-        for number, one in enumerate(machine.actuators)
-    ]
-    return counts, [*lacking(missing), *said], lowest, tracks, accounts
+            if not is_begun:
+                is_begun = True
+                for part, known in zip(parts, state.actuators, strict=True):
+                    text = encode_text(snapshot_text(Snapshot(part.actuator.configuration, known.pipeline)))
+                    part.writer.write(rosbag.CONFIGURATION_TOPIC, CONFIGURATION_TYPE, message.log_time, text)
+            for part in parts if message.topic in also else ():
+                part.writer.write(*message)
+            if message.topic in machine.plans:
+                read[message.topic] += 1
+                with rosbag.named(bag, message):
+                    made = translation.records(message._replace(publish_time=None), missing)
+                    for number, record, frame_id in made:
+                        parts[number].take(record, frame_id, message.log_time)
+    remarks = [*lacking(missing), *(text for part in parts for text in part.stamp_remarks())]
+    samples = [_account(bag, part, read, translation.malformed) for part in parts]
+    for part, account in zip(parts, samples, strict=True):
+        if not account.used:
+            raise ValueError(no_velocity(bag, part.actuator.name, remarks))
+        account.check()
+    return remarks, samples
 
 
-def _account(
-    bag: Path, actuator: MachineActuator, read: Counter[str], malformed: Counter[str], early: int, used: int
-) -> Account:
+def _account(bag: Path, part: _Part, read: Counter[str], malformed: Counter[str]) -> Account:
     """Messages on the topic of the velocity of an actuator, by the numbers ``read`` and ``malformed`` on each topic."""
-    (topic,) = sources_of(actuator)['velocity']
-    nothing = read[topic] - malformed[topic] - early - used
-    left_out = {MALFORMED: malformed[topic], NO_VELOCITY: nothing, NOT_STARTED: early}
-    return Account(f'{bag}: {actuator.name}', used, {reason: count for reason, count in left_out.items() if count})
+    (topic,) = sources_of(part.actuator)['velocity']
+    used = part.counts[rosbag.VELOCITY_TOPIC]
+    nothing = read[topic] - malformed[topic] - part.early - used
+    left_out = {MALFORMED: malformed[topic], NO_VELOCITY: nothing, NOT_STARTED: part.early}
+    return Account(f'{bag}: {part.actuator.name}', used, {reason: count for reason, count in left_out.items() if count})
 
 
 def _awaited(actuator: MachineActuator, present: Collection[str]) -> set[str]:
@@ -172,11 +175,3 @@ def _awaited(actuator: MachineActuator, present: Collection[str]) -> set[str]:
     sources = sources_of(actuator)
     kinds = {'pressure': PRESSURE_TYPE, 'force': FORCE_TYPE}
     return {kind for name, kind in kinds.items() if name in sources and {*sources[name]} <= {*present}}
-
-
-def _write_configurations(
-    machine: Machine, state: MachineState, writers: list[rosbag.BagWriter], log_time: int
-) -> None:
-    for actuator, known, writer in zip(machine.actuators, state.actuators, writers, strict=True):
-        text = encode_text(snapshot_text(Snapshot(actuator.configuration, known.pipeline)))
-        writer.write(rosbag.CONFIGURATION_TOPIC, CONFIGURATION_TYPE, log_time, text)

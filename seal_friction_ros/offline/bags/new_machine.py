@@ -3,6 +3,7 @@
 All guesses are our choice: by types, by the names of topics and joints, and by the values.
 """
 
+import json
 import math
 import re
 import subprocess
@@ -127,12 +128,12 @@ def recorded_topics(seconds: float, wait: float) -> Iterator[tuple[Path, list[st
     types = [kind.replace('/', '/msg/') for kind in KNOWN]
     with TemporaryDirectory() as folder:
         bag = Path(folder) / 'robot'
-        command = [sys.executable, '-m', 'seal_friction_ros.nodes.topic_recorder', *types]
-        command += ['--seconds', str(seconds), '--wait', str(wait), '--out', str(bag)]
+        task = {'action': 'record', 'types': types, 'seconds': seconds, 'wait': wait, 'out': str(bag)}
+        command = [sys.executable, '-m', 'seal_friction_ros.nodes.topic_tool', json.dumps(task)]
         recorder = subprocess.run(command, capture_output=True, text=True, check=False)
         if recorder.returncode:
             said = recorder.stderr.strip().splitlines() or ['the process that listens ended early']
-            raise BagError(f'--from-topics: {said[-1].removeprefix("topic_recorder: ")}')
+            raise BagError(f'--from-topics: {said[-1].removeprefix("seal_friction topics: ")}')
         yield bag, [line for line in recorder.stdout.splitlines() if line]
 
 

@@ -91,10 +91,7 @@ def read_run(bag: Path, namespace: str = '', mapping: MappingFile | None = None)
     if not source.topics.estimate:
         raise BagError(f'{bag}: no estimates in it: add them with seal_friction replay {bag} --out BAG')
     messages = source.messages(with_answers=True) if source.mapping is not None else None
-    collector = collected(source, wanted_of_run(source), RunCollector, messages=messages)
-    if not collector.stamps:
-        raise BagError(f'{bag}: the index lists estimates, but the bag holds none')
-    return collector.run(source)
+    return collected(source, wanted_of_run(source), RunCollector, messages=messages).run(source)
 
 
 def wanted_of_run(source: ActuatorBag) -> dict[str, Wanted]:
@@ -166,7 +163,9 @@ class RunCollector:
         forces[places[same]] = feedforwards.numbers[0, before >= 0][same]
 
     def run(self, source: ActuatorBag) -> RecordedRun:
-        """Arrays of all messages so far; an input that cannot be a measurement becomes NaN."""
+        """Arrays of all messages so far; an input that cannot be a measurement becomes NaN. BagError: no estimate."""
+        if not self.stamps:
+            raise BagError(f'{source.path}: the index lists estimates, but the bag holds none')
         stamps = np.frombuffer(self.stamps, dtype=np.int64)
         columns = [np.frombuffer(column, dtype=np.float64) for column in self._columns]
         values: dict[str, Any] = dict(zip(_COLUMNS, columns, strict=True))

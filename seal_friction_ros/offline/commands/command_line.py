@@ -271,10 +271,10 @@ def positive(text: str) -> float:
     return float(text)
 
 
-def add_film(parser: Any) -> None:
-    """Add `--film`."""
-    help_text = 'viscosity [Pa s] and speed: film of each direction and leakage, as of a smooth seal'
-    parser.add_argument('--film', type=quantities('Pa s', 'm/s'), metavar='VISCOSITY,SPEED', help=help_text)
+def quantity(unit: str) -> Callable[[str], float]:
+    """Type of an option: a number in SI or with a unit; ``unit`` is that of SI."""
+    values = quantities(unit)
+    return lambda text: values(text)[0]
 
 
 def quantities(*units: str) -> Callable[[str], tuple[float, ...]]:
@@ -317,6 +317,7 @@ def at_least(least: int) -> Callable[[str], int]:
     return whole_number
 
 
+PRESSURE = 'gauge, in Pa or with a unit', {'type': quantity('Pa'), 'nargs': '+', 'required': True, 'metavar': 'P'}
 _SAMPLES = 'quantiles from N samples of what the case lists as unknown'
 _SHARED: dict[str, tuple[str, Settings]] = {
     'bags': ('path, or URL of fsspec', {'type': place, 'nargs': '+', 'metavar': 'BAG'}),
@@ -329,7 +330,18 @@ _SHARED: dict[str, tuple[str, Settings]] = {
     '--retry-failed': ('with --work: try again what failed before', {'action': 'store_true'}),
     '--uncertain': (_SAMPLES, {'type': at_least(2), 'metavar': 'N'}),
     '--seed': ('with --uncertain: of the samples; default: 0', {'type': at_least(0), 'metavar': 'S'}),
-}
+    '--reading': (
+        'measured sliding friction of one seal, in SI or with units; repeat it for several',
+        {
+            'action': 'append', 'default': [], 'type': quantities('Pa', 'm/s', 'N'),
+            'metavar': 'PRESSURE,SPEED,FRICTION',
+        },
+    ),
+    '--film': (
+        'viscosity [Pa s] and speed: film of each direction and leakage, as of a smooth seal',
+        {'type': quantities('Pa s', 'm/s'), 'metavar': 'VISCOSITY,SPEED'},
+    ),
+}  # fmt: skip
 
 
 # -- output -----------------------------------------------------------------------------------------------------------

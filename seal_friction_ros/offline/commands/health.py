@@ -44,10 +44,7 @@ def add_parser(commands: Any) -> None:
 _LIMITS: dict[str, tuple[str, cli.Settings]] = {
     '--scale-low': ('alarm below this scale (0.6)', {'type': cli.non_negative, 'default': 0.6}),
     '--scale-high': ('alarm above this scale (1.5)', {'type': cli.non_negative, 'default': 1.5}),
-    '--breakaway': (
-        'alarm above this starting force over the friction (2.5)',
-        {'type': cli.non_negative, 'default': 2.5},
-    ),
+    '--breakaway': ('alarm above this start over the friction (2.5)', {'type': cli.non_negative, 'default': 2.5}),
     '--noise': ('alarm above this residual over the friction (0.3)', {'type': cli.non_negative, 'default': 0.3}),
 }
 
@@ -101,10 +98,9 @@ def _learnt_text(day: dict[str, Any]) -> str:
 def run_fleet(arguments: argparse.Namespace) -> int:
     """Summarise every bag; write page and table."""
     from seal_friction_ros.core.estimation.findings import GOOD
-    from seal_friction_ros.offline.bags.find_bags import find_bags
     from seal_friction_ros.offline.replay.bag_summary import DIFFERENT, summaries
-    from seal_friction_ros.offline.reports.fleet_report import judged, rigs_of, write_fleet_report
-    from seal_friction_ros.offline.reports.fleet_table import write_fleet_table
+    from seal_friction_ros.offline.reports.fleet_report import judged, rigs_of, write_fleet_report, write_fleet_table
+    from seal_friction_ros.offline.work.places import find_bags
     from seal_friction_ros.packages import needed
 
     if arguments.parquet:
@@ -127,7 +123,7 @@ def run_fleet(arguments: argparse.Namespace) -> int:
 
 def run_adapt(arguments: argparse.Namespace) -> int:
     """Learn from the bags in the order given."""
-    from seal_friction_ros.offline.replay.adapted_seal import write_adapted_seal
+    from seal_friction_ros.offline.replay.bag_health import write_adapted_seal
 
     numbers = write_adapted_seal(arguments.bags, arguments.seal, arguments.out, arguments.namespace)
     summary = (

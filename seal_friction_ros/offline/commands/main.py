@@ -23,7 +23,6 @@ from seal_friction_ros.offline.commands import (
     new,
     oring,
     seals,
-    section,
     topics,
     tune,
 )
@@ -39,7 +38,7 @@ GROUPS = {
     'identify': (identify, *of_studies('commands.spool'), seals),
     'watch': (monitor, topics, health),
     'tune': (tune,),
-    'compute': (oring, section, ehl),
+    'compute': (oring, ehl),
     'machine': (new, export, doctor),
 }
 

@@ -1,7 +1,6 @@
 """Commands on seal files and data sheets: ``seal_friction`` ``sheet``, ``seals``, ``charts``, ``force``."""
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +31,7 @@ def add_parser(commands: Any) -> None:
     cli.add_options(sheet, _OF_SHEET)
     seals.add_argument('--kind', choices=('rod', 'piston'), help='with --diameter: seals for a cylinder, catalogue too')
     text = 'of the rod, or of the bore of a piston seal, in m or with a unit'
-    seals.add_argument('--diameter', type=_one('m'), metavar='D', help=text)
+    seals.add_argument('--diameter', type=cli.quantity('m'), metavar='D', help=text)
     seals.add_argument('folders', type=Path, nargs='*', metavar='FOLDER', help='default: config/seals')
     seals.add_argument('--full', action='store_true', help='print the whole source of each seal')
     cli.add_file(charts, 'seal', 'seals', 'seal file', metavar='SEAL')
@@ -61,14 +60,9 @@ _SEALS = ('seals', 'seals my_seals --full', 'seals --kind rod --diameter 36mm')
 _OF_PLAN = ('tests', 'seals', 'pressure_unit', 'force_unit', 'length_unit')
 
 
-def _one(unit: str) -> Callable[[str], float]:
-    values = cli.quantities(unit)
-    return lambda text: values(text)[0]
-
-
 _OF_FORCE: dict[str, tuple[str, cli.Settings]] = {
-    '--pressure': ('gauge, in Pa or with a unit', {'type': _one('Pa'), 'nargs': '+', 'required': True, 'metavar': 'P'}),
-    '--speed': ('in m/s or with a unit; default: Coulomb friction', {'type': _one('m/s'), 'default': 0.0}),
+    '--pressure': cli.PRESSURE,
+    '--speed': ('in m/s or with a unit; default: Coulomb friction', {'type': cli.quantity('m/s'), 'default': 0.0}),
     '--seals': ('seals at that pressure, default 1', {'type': cli.at_least(1), 'default': 1, 'metavar': 'N'}),
 }
 

@@ -54,12 +54,11 @@ def run(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.bags.actuator_bag import open_actuator
     from seal_friction_ros.offline.reports.tune_report import write_tuning_page
     from seal_friction_ros.offline.tuning import tune
-    from seal_friction_ros.offline.tuning.recorded_command import read_output_gain
 
     settings, gain = (RecordedAxisSettings if arguments.bag else TuningSettings)(**_given(arguments)), None
     if isinstance(settings, RecordedAxisSettings) and arguments.command_topic:
         axis = open_actuator(arguments.bag, arguments.namespace, cli.mapping_of(arguments))
-        gain = read_output_gain(axis, arguments.command_topic, settings)
+        gain = tune.read_output_gain(axis, arguments.command_topic, settings)
     tuning = api.tune(
         arguments.bag, settings=settings, seals=arguments.seal or (), params=arguments.params,
         namespace=arguments.namespace, mapping=arguments.mapping, machine=arguments.machine,

@@ -104,7 +104,7 @@ def _as_row(values: 'array[float]') -> Row:
 
 
 class RecordedView:
-    """A bag, sampled at the pace of the live view: to its first estimate at once, the rest by `read` or `load`.
+    """A bag, sampled at the pace of the live view: to its first estimate at once, the rest by `read`.
 
     With a ``mapping`` the estimates are made here. BagError: the bag cannot be read, or has no estimates; ValueError:
     the mapping does not fit the bag.
@@ -136,12 +136,6 @@ class RecordedView:
         if not self._tracks:
             reason = next((view.refused for view, _ in self._nodes if view.refused), 'there is none')
             raise BagError(f'{bag}: the configuration of the estimator in it cannot be read: {reason}')
-
-    def load(self) -> 'RecordedView':
-        """Read the rest."""
-        for _ in self.read():
-            pass
-        return self
 
     def read(self) -> Iterator[None]:
         """Read the rest, slice by slice: between two the page may ask. An error ends it, and the page says so."""

@@ -5,6 +5,7 @@ with its length.
 """
 
 import dataclasses
+import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.estimation.adaptation import AdaptationState
+from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationState
 from seal_friction_ros.core.estimation.adaptation import learnt as learnt_of
 from seal_friction_ros.core.estimation.compiled_pipeline import Answers
 from seal_friction_ros.core.estimation.configuration import Configuration, Snapshot
@@ -21,24 +22,27 @@ from seal_friction_ros.core.estimation.friction_filter import PROVEN
 from seal_friction_ros.core.estimation.seal_health import START, Starts, with_sample
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.errors import named_errors
+from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import SLIDING
 from seal_friction_ros.core.identification import admission
 from seal_friction_ros.core.identification.admission import Account, account, together
 from seal_friction_ros.core.messages.blocks import Messages, UnsuitedError, numbers_of
 from seal_friction_ros.core.messages.layouts import ESTIMATE_TYPE
 from seal_friction_ros.core.messages.records import NEVER, NO_ESTIMATE, FrictionEstimate, Status
-from seal_friction_ros.files import default_configuration
+from seal_friction_ros.files import config_path, default_configuration, read_yaml
 from seal_friction_ros.offline.bags.actuator_bag import open_actuator
 from seal_friction_ros.offline.bags.bag import BagError
 from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS
 from seal_friction_ros.offline.replay.bag_parts import Chosen, try_bags
 from seal_friction_ros.offline.replay.compiled_replay import Run, compile_first, kinds_of_topics
+from seal_friction_ros.offline.replay.replay import chosen_configuration
 from seal_friction_ros.offline.replay.run_findings import verdict_in_words
 from seal_friction_ros.offline.work.executor import Workers
 from seal_friction_ros.offline.work.finished_parts import NOWHERE, Kept
 from seal_friction_ros.offline.work.outcome import Outcome
 from seal_friction_ros.offline.work.places import Place
+from seal_friction_ros.offline.work.seal_writer import rounded, write_seal
 
 
 class BagHealth(NamedTuple):
@@ -198,3 +202,35 @@ def _estimates(answers: Answers) -> Any:
     for (name, _), column in zip(kinds, (stamps, *numbers), strict=True):
         found[name] = column
     return found
+
+
+def write_adapted_seal(bags: Sequence[Path], seal: Path, out: Path, namespace: str = '') -> dict[str, Any]:
+    """Write ``seal`` with the scale learnt from bags, in order of time, as its ``friction_scale``; the numbers learnt.
+
+    The standard deviation stays that of the file: the scale is that of these days, and the next day differs again.
+    ValueError: a bag or the seal file cannot be used, or the last bag has too few reversals to learn from.
+    """
+    override = chosen_configuration(None, seal)
+    state = None
+    for bag in bags:
+        state = bag_health(bag, namespace, override, state).learnt or state
+    found = learnt_of(state or NOT_ADAPTED)
+    if found.scale_std < 0.0:
+        hint = 'move the rod to and fro at least four times, or give adaptation.moving_mass'
+        raise ValueError(f'{bags[-1]}: too few reversals at even speed to learn a scale: {hint}')
+    document = dict(read_yaml(config_path('seals', str(seal))))
+    before = parse_seal(document).friction_scale
+    document['friction_scale'] = rounded(before * found.scale, 6)
+    document['source'] = (
+        f'{document.get("source", "")} Friction scaled by {found.scale:.4g} by seal_friction adapt, standard deviation '
+        f'{found.scale_std:.2g}, {found.reversals} reversals of {", ".join(bag.name for bag in bags)}.'
+    ).strip()
+    write_seal(document, out, 'Seal file, made by seal_friction adapt.')
+    return {
+        'scale': found.scale,
+        'scale_std': found.scale_std,
+        'offset_N': found.offset,
+        'noise_N': found.noise if math.isfinite(found.noise) else None,
+        'reversals': found.reversals,
+        'friction_scale': document['friction_scale'],
+    }

@@ -28,13 +28,18 @@ from seal_friction_ros.files import default_configuration, load_configuration, l
 from seal_friction_ros.offline.bags import bag as rosbag
 from seal_friction_ros.offline.bags.actuator_bag import (
     ANSWER_TOPICS,
+    MADE,
     RECORDED,
     TYPES,
     ActuatorBag,
     find_topics,
+    open_actuator,
     source_of,
 )
 from seal_friction_ros.offline.bags.bag import STATE_PERIOD
+from seal_friction_ros.offline.bags.columns import collected
+from seal_friction_ros.offline.bags.mapped_bag import MappingFile
+from seal_friction_ros.offline.bags.recorded_run import RecordedRun, RunCollector, read_run, wanted_of_run
 from seal_friction_ros.offline.replay.answer_comparison import AnswerStream, ReplayResult, replay_result
 from seal_friction_ros.offline.work.progress import counted, progress
 
@@ -59,19 +64,11 @@ def chosen_configuration(
     return load_configuration(selection, settings, feedforward, adaptation)
 
 
-class Answer(NamedTuple):
-    """One message that the estimator makes."""
-
-    topic: str
-    type_name: str
-    data: bytes
-
-
 class Step(NamedTuple):
     """One message, and the answers of the estimator to it."""
 
     message: rosbag.BagMessage
-    answers: tuple[Answer, ...]
+    answers: tuple[rosbag.BagMessage, ...]
 
 
 class Replay:
@@ -146,8 +143,7 @@ class Replay:
         if message.topic in acted:
             yield message._replace(topic=acted[message.topic])
         elif message.topic in self.kept and message.topic not in self.answers:
-            yield message
-            yield from (rosbag.BagMessage(topic, kind, message.log_time, data) for topic, kind, data in step.answers)
+            yield from (message, *step.answers)
 
     def _state_at(self, log_time: int) -> Iterator[Step]:
         if self._machine is not None and self._state is not None:
@@ -207,7 +203,7 @@ class Replay:
         found = [topic for topic, info in self.topics.items() if info.type_name == kind and topic.endswith(end)]
         return found[0] if found else end
 
-    def _answers_to(self, message: rosbag.BagMessage) -> Iterable[Answer]:
+    def _answers_to(self, message: rosbag.BagMessage) -> Iterable[rosbag.BagMessage]:
         """Answers to a message; BagError if it does not match its type."""
         plan = self._plans.get(message.topic)
         if plan is None or self._machine is None or self._state is None:
@@ -226,19 +222,18 @@ class Replay:
     def _collect(self, name: str, answer: Output, frame_id: bytes) -> None:
         self._made.append(NamedAnswer(name, answer, frame_id))
 
-    def _encoded(self, machine: Machine, state: MachineState, received: int) -> list[Answer]:
-        """What was collected, and the commands that follow from it, as bytes."""
+    def _encoded(self, machine: Machine, state: MachineState, received: int) -> Iterator[rosbag.BagMessage]:
+        """What was collected, and the commands that follow from it, as messages."""
         kinds = [type_of(answer.record) for answer in self._made]
         self.estimates += kinds.count(layouts.ESTIMATE_TYPE)
-        answers = []
         if not machine.file.together:
             for kind, (name, record, frame_id) in zip(kinds, self._made, strict=True):
-                answers.append(Answer(self._topic_of[name, kind], kind, encode(record, frame_id)))
+                yield rosbag.BagMessage(self._topic_of[name, kind], kind, received, encode(record, frame_id))
         elif self._made:
-            together = layouts.MACHINE_TYPE
-            answers = [Answer(self._topic_of['', together], together, encode_together(self._made))]
-        commands = due_commands(machine, state, layouts.FEEDFORWARD_TYPE in kinds, received)
-        return answers + [Answer(command.topic, full_name(command.type_name), command.data) for command in commands]
+            topic = self._topic_of['', layouts.MACHINE_TYPE]
+            yield rosbag.BagMessage(topic, layouts.MACHINE_TYPE, received, encode_together(self._made))
+        for command in due_commands(machine, state, layouts.FEEDFORWARD_TYPE in kinds, received):
+            yield rosbag.BagMessage(command.topic, full_name(command.type_name), received, command.data)
 
 
 def replay(
@@ -264,13 +259,21 @@ def answered_anew(
 ) -> tuple[ActuatorBag, Iterator[rosbag.BagMessage]]:
     """An actuator with the topics of new answers, and its messages with these answers; arguments as of `Replay`."""
     replayed = Replay(actuator, override)
-    answers = {_FIELDS[kind]: topic for topic, kind in replayed.answers.items()}
+    answers = {MADE[kind]: topic for topic, kind in replayed.answers.items()}
     topics = actuator.topics._replace(configuration=replayed.configuration, **answers)
     kept = (message for step in replayed.steps() for message in replayed.kept_of(step))
     return actuator._replace(topics=topics), kept
 
 
-_FIELDS = {layouts.ESTIMATE_TYPE: 'estimate', layouts.FEEDFORWARD_TYPE: 'feedforward'}
+def estimated_run(
+    bag: Path, namespace: str = '', mapping: MappingFile | None = None, override: Configuration | None = None
+) -> RecordedRun:
+    """`read_run`; the estimates are made anew where there are none, or by the ``override``, as of `Replay`."""
+    actuator = open_actuator(bag, namespace, mapping)
+    if override is None and actuator.topics.estimate:
+        return read_run(bag, namespace, mapping)
+    source, messages = answered_anew(actuator, override)
+    return collected(source, wanted_of_run(source), RunCollector, messages=messages).run(source)
 
 
 def count_messages(topics: Mapping[str, rosbag.TopicInfo]) -> int:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -21,11 +20,10 @@ from seal_friction_ros.core.estimation.findings import (
     verdict_of,
 )
 from seal_friction_ros.core.foundation.units import UM
-from seal_friction_ros.offline.bags.actuator_bag import open_actuator
 from seal_friction_ros.offline.bags.bag import BagError
-from seal_friction_ros.offline.bags.recorded_run import RecordedRun, read_run
+from seal_friction_ros.offline.bags.recorded_run import RecordedRun
 from seal_friction_ros.offline.replay.bag_parts import Chosen
-from seal_friction_ros.offline.replay.replay import replay
+from seal_friction_ros.offline.replay.replay import estimated_run
 from seal_friction_ros.offline.replay.tracking_evaluation import (
     TrackingEvaluation,
     configuration_stretches,
@@ -74,12 +72,8 @@ def bag_findings(bag: Path, chosen: Chosen) -> list[Finding]:
 
     BagError: the bag cannot be read.
     """
-    mapping, namespace = chosen.mapping, chosen.namespace
-    if mapping is None and (chosen.override is not None or not open_actuator(bag, namespace).topics.estimate):
-        with TemporaryDirectory() as folder:
-            replay(bag, chosen.override, Path(folder) / bag.name, namespace)
-            return _of(read_run(Path(folder) / bag.name, namespace), chosen.limits)
-    return _of(read_run(bag, namespace, mapping), chosen.limits)
+    run = estimated_run(bag, chosen.namespace, chosen.mapping, chosen.override)
+    return run_findings(run, seen_in(run.samples), evaluate_tracking(run), chosen.limits)
 
 
 def verdict_in_words(bag: Path, chosen: Chosen, more: Sequence[Finding] = ()) -> Verdict:
@@ -88,7 +82,3 @@ def verdict_in_words(bag: Path, chosen: Chosen, more: Sequence[Finding] = ()) ->
         return verdict_of([*bag_findings(bag, chosen), *more])
     except BagError as error:
         return Verdict(BAD, str(error).removeprefix(f'{bag}: '))
-
-
-def _of(run: RecordedRun, limits: Limits) -> list[Finding]:
-    return run_findings(run, seen_in(run.samples), evaluate_tracking(run), limits)

@@ -22,6 +22,7 @@ BLACK, GREY, LIGHT_GREY = '#1a1a1a', '#7f7f7f', '#d9d9d9'
 BLUE, SKY, ORANGE, VERMILLION, GREEN, PURPLE = '#0072b2', '#56b4e9', '#e69f00', '#d55e00', '#009e73', '#cc79a7'
 WIDTH = 8.6  # [inch]
 _LEGEND_HEIGHT = 0.3  # [inch]
+_PANELS = 3  # in a row
 COLUMNS = 1200  # of pixels across a figure
 DETAIL = 4000  # the same for the figure of a page, which is zoomed
 _LONGEST_STEP = 10.0  # usual steps between two values that a line joins (our choice)
@@ -97,10 +98,16 @@ def new_figure(title: str, height: float, **layout: Any) -> tuple[Figure, Any]:
     return figure, figure.subplots(**layout)
 
 
-def panels(title: str, count: int, height: float, columns: int = 3) -> tuple[Figure, list[Axes]]:
+def panels(title: str, count: int, height: float) -> tuple[Figure, list[Axes]]:
     """Figure of ``count`` panels of a height [inch] in rows, all on the same axes."""
-    rows, columns = -(-count // columns), min(count, columns)
-    layout: dict[str, Any] = {'nrows': rows, 'ncols': columns, 'squeeze': False, 'sharex': True, 'sharey': True}
+    rows = -(-count // _PANELS)
+    layout: dict[str, Any] = {
+        'nrows': rows,
+        'ncols': min(count, _PANELS),
+        'squeeze': False,
+        'sharex': True,
+        'sharey': True,
+    }
     figure, axes = new_figure(title, 0.6 + height * rows, **layout)
     flat = list(axes.ravel())
     for ax in flat[count:]:
@@ -108,12 +115,12 @@ def panels(title: str, count: int, height: float, columns: int = 3) -> tuple[Fig
     return figure, flat[:count]
 
 
-def label_panels(axes: Sequence[Axes], xlabel: str, ylabel: str, columns: int = 3) -> None:
+def label_panels(axes: Sequence[Axes], xlabel: str, ylabel: str) -> None:
     """Label the lowest panel of each column and the first panel of each row."""
-    for ax in axes[-columns:]:
+    for ax in axes[-_PANELS:]:
         ax.set_xlabel(xlabel)
         ax.tick_params(labelbottom=True)
-    for ax in axes[::columns]:
+    for ax in axes[::_PANELS]:
         ax.set_ylabel(ylabel)
 
 

@@ -1,8 +1,9 @@
-"""The page of a fleet: which rig drifts, which recording is damaged; a row and a curve a rig, a row a bag."""
+"""The page of a fleet: which rig drifts, which recording is damaged; a row and a curve a rig, a row a bag; a table."""
 
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import quote
@@ -10,15 +11,18 @@ from urllib.parse import quote
 import numpy as np
 
 from seal_friction_ros.core.estimation.findings import BAD, GOOD, LOOK, SMALL_CHANGE, Verdict, worst
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
-from seal_friction_ros.offline.replay.bag_summary import DIFFERENT, BagSummary
+from seal_friction_ros.offline.replay.bag_summary import DIFFERENT, LEVEL_COLUMNS, BagSummary
 from seal_friction_ros.offline.replay.health_indicators import NOT_TOLD, UNKNOWN_DAY, Day, Value, trend
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import FIRST_DATE, date_text
 from seal_friction_ros.offline.reports.page import ReportSummary, head_of, write_page
+from seal_friction_ros.offline.work.atomic_file import write_whole
 from seal_friction_ros.offline.work.outcome import Outcome
 from seal_friction_ros.offline.work.places import Place
+from seal_friction_ros.packages import needed
 
 HOURS_A_DAY = 24.0
 _COLOURS = (style.VERMILLION, style.BLUE, style.GREEN, style.ORANGE, style.PURPLE, style.SKY)
@@ -232,3 +236,42 @@ def _figure(bags: Sequence[FleetBag], rigs: Sequence[Rig]) -> Plot:
     axes.axhline(1.0, color=style.GREY, lw=0.8)
     axes.set_xlabel(f'days since {date_text(begin)[:10]}' if begin else 'no bag has a date')
     return finished('scale', figure, axes, ylabel='friction / seal file [-]')
+
+
+# -- Parquet table -----------------------------------------------------------------------------------------------------
+
+_TEXTS, _COUNTS = ('replay', 'difference', 'next', 'health'), ('messages', 'reversals')
+_OF_BAG = [name for name in BagSummary._fields if name not in ('levels', 'level', 'why')]
+_OF_LEVEL = [f'level_{name}' for name in LEVEL_COLUMNS]
+
+
+def write_fleet_table(bags: Sequence[FleetBag], out: Path) -> None:
+    """Write the table; SI units, null where a bag does not tell. A bag without a pressure level has one row.
+
+    An existing file is replaced. MissingPackageError: pyarrow is not installed; ValueError: the file cannot be written.
+    """
+    arrow, parquet = needed('pyarrow'), needed('pyarrow.parquet')
+    kinds = dict.fromkeys(('bag', 'level', 'why', *_TEXTS), arrow.string()) | dict.fromkeys(_COUNTS, arrow.int64())
+    names = ('bag', 'level', 'why', *_OF_BAG, *_OF_LEVEL)
+    schema = arrow.schema([(name, kinds.get(name, arrow.float64())) for name in names])
+    buffer = BytesIO()
+    table = arrow.Table.from_pylist([row for bag in bags for row in _table_rows(bag)], schema)
+    parquet.write_table(table, buffer, compression='zstd')
+    with named_errors(f'{out}: cannot write the table', OSError):
+        write_whole(out, buffer.getvalue())
+
+
+def _table_rows(bag: FleetBag) -> Iterator[dict[str, Any]]:
+    of_bag: dict[str, Any] = {'bag': str(bag.path), 'level': bag.level, 'why': bag.why}
+    of_bag |= {name: getattr(bag.summary, name, None) for name in _OF_BAG}
+    levels = bag.summary.levels.tolist() if bag.summary is not None else []
+    for level in levels or [()]:
+        row = of_bag | dict(zip(_OF_LEVEL, level, strict=False))
+        yield {name: _storable(value) for name, value in row.items()}
+
+
+def _storable(value: Any) -> Any:
+    """A value as the table holds it: no NaN, and text without what UTF-8 cannot hold."""
+    if isinstance(value, str):
+        return value.encode(errors='replace').decode()
+    return None if value != value else value  # noqa: PLR0124  NaN

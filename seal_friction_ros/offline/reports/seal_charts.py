@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from seal_friction_ros.core.estimation.configuration import PLACEHOLDER
 from seal_friction_ros.core.estimation.findings import BAD, GOOD, LOOK, NAME_SEALS, Verdict, percent
 from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.errors import named_errors
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import BAR, INCH, LBF, MM, PSI
 from seal_friction_ros.core.friction.actuator import (
@@ -93,10 +94,9 @@ def write_seal_charts(seal: Path, out: Path) -> ReportSummary:
 
     ValueError: the seal file cannot be read or is invalid, or the page cannot be written.
     """
-    try:
-        shown = charted_seal(parse_seal(document := read_yaml(seal)))
-    except ValueError as error:
-        raise ValueError(str(error) if str(error).startswith(str(seal)) else f'{seal}: {error}') from None
+    document = read_yaml(seal)
+    with named_errors(seal):
+        shown = charted_seal(parse_seal(document))
     law, normal, dimensions = shown.seal.coulomb_law, None, None
     if isinstance(law, PhysicsBased):  # normal force of one seal without pressure [N]: of the law, and of Table 4
         of_table = thesis_columns('normal_force', normal_force_lbf=LBF)[0]

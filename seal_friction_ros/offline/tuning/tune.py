@@ -5,7 +5,7 @@ axis gives the same bytes.
 """
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,19 +25,21 @@ from seal_friction_ros.core.foundation.units import MM, MS, UM
 from seal_friction_ros.core.identification import admission
 from seal_friction_ros.core.messages import layouts
 from seal_friction_ros.core.messages.blocks import Numbers
+from seal_friction_ros.core.messages.fields import Reader
 from seal_friction_ros.core.messages.records import ServoReference
 from seal_friction_ros.core.servo import simulator_options as simulator
 from seal_friction_ros.core.servo.closed_loop import IDEAL_SENSORS, Axis, AxisSensors
 from seal_friction_ros.core.servo.sensors import SensorSettings
 from seal_friction_ros.core.servo.tracking import tracking_peak, tracking_rms
 from seal_friction_ros.core.tuning.other_plants import PlantOutcome, on_plants
+from seal_friction_ros.core.tuning.output_gain import CommandRecord, OutputGain, output_gain
 from seal_friction_ros.core.tuning.recorded_axis import RecordedTuning, Recording, tune_recorded_axis
 from seal_friction_ros.core.tuning.settings import FORCE_MARGIN, RecordedAxisSettings, TunedFeedForward, TuningSettings
 from seal_friction_ros.core.tuning.simulated_axis import MOST_CANDIDATES, Tuning, TuningProblem, tune
 from seal_friction_ros.files import default_configuration, read_parameters
 from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag
-from seal_friction_ros.offline.bags.bag import BagError
-from seal_friction_ros.offline.bags.columns import Block, collected
+from seal_friction_ros.offline.bags.bag import BagError, read_definitions
+from seal_friction_ros.offline.bags.columns import Block, Wanted, collected, read_velocity_rows
 from seal_friction_ros.offline.bags.recorded_run import RunCollector, wanted_of_run
 from seal_friction_ros.offline.replay.replay import answered_anew
 from seal_friction_ros.offline.work.atomic_file import write_whole
@@ -68,6 +70,16 @@ class TuningTask(NamedTuple):
         now, was = found.feedforward.force_limit, self.before.force_limit
         limit = f'force_limit: {now:g} N (was {was:g} N): {FORCE_MARGIN:g} times the largest friction found.'
         return (limit, f'Warning: {PLACEHOLDER_WARNING}.') if self.has_placeholder else (limit,)
+
+    def numbers(self, found: TunedFeedForward[Any], of_case: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:
+        """Numbers of any tuning for JSON, in SI units; ``of_case`` gives those of the outcome of a case."""
+        return {
+            'largest_friction': found.largest_friction,
+            'placeholder_seals': self.has_placeholder,
+            'parameters': asdict(found.feedforward),
+            'better_in_every_case': found.better_in_every_case,
+            'robustness': [{'friction_error': f, 'delay_error': d} | of_case(outcome) for f, d, outcome in found.cases],
+        }
 
 
 class RecordedTrack(NamedTuple):
@@ -131,20 +143,12 @@ class SimulatorTuning:
         found = self.found
         return {
             'source': 'simulator',
-            'largest_friction': found.largest_friction,
-            'placeholder_seals': self.task.has_placeholder,
-            'parameters': asdict(found.feedforward),
+            **self.task.numbers(found, lambda one: {name: getattr(one, name) for name in PERFORMANCE}),
             'merit': found.merit,
             **{f'{name}_without': getattr(found.without, name) for name in PERFORMANCE},
             **{f'{name}_with': getattr(found.nominal, name) for name in PERFORMANCE},
             'largest_force': found.nominal.largest_force,
             'largest_force_rate': found.nominal.largest_force_rate,
-            'better_in_every_case': found.better_in_every_case,
-            'robustness': [
-                {'friction_error': friction_error, 'delay_error': delay_error}
-                | {name: getattr(performance, name) for name in PERFORMANCE}
-                for friction_error, delay_error, performance in found.cases
-            ],
             'plants': [
                 {'plant': plant, 'without': was._asdict(), 'with': now._asdict()} for plant, was, now in self.plants
             ],
@@ -191,9 +195,7 @@ class BagTuning:
         return {
             'source': 'bag',
             'bag': self.bag,
-            'largest_friction': found.largest_friction,
-            'placeholder_seals': self.task.has_placeholder,
-            'parameters': asdict(found.feedforward),
+            **self.task.numbers(found, lambda left: {'residual': left._asdict()}),
             'told_by_bag': found.identified,
             **{f'{name}_{which}': None for name in PERFORMANCE for which in ('without', 'with')},
             'residual_without': found.without._asdict(),
@@ -203,11 +205,6 @@ class BagTuning:
             'mass': law.mass,
             'mass_is_fitted': law.mass_is_fitted,
             'force_offset': law.offset,
-            'better_in_every_case': found.better_in_every_case,
-            'robustness': [
-                {'friction_error': friction_error, 'delay_error': delay_error, 'residual': left._asdict()}
-                for friction_error, delay_error, left in found.cases
-            ],
             **self.track.numbers(),
             **law.samples.numbers,
             'settings': asdict(self.known),
@@ -370,6 +367,42 @@ def _conditioned(settings: EstimatorSettings, references: Sequence[Numbers]) -> 
             conditioned = condition_reference(conditioned, wanted)
         moved.append((conditioned.velocity.velocity, conditioned.acceleration))
     return stamps, np.array(moved).reshape(-1, 2).T
+
+
+# -- gain from force to command ----------------------------------------------------------------------------------------
+
+_COMMAND_FIELDS = {layouts.NUMBER_TYPE: 'data', layouts.NUMBERS_TYPE: 'data[0]'}
+
+
+def read_output_gain(source: ActuatorBag, topic: str, known: RecordedAxisSettings) -> OutputGain:
+    """Gain from force to the command on a topic, a `std_msgs/Float64` or `Float64MultiArray`.
+
+    The bag has the command, pressures, velocity and, if measured, position; the areas of both chambers are ``known``.
+    BagError: the bag lacks something, or cannot tell the gain.
+    """
+    if not (known.area_a and known.area_b):
+        raise BagError(f'{topic}: give --area-a and --area-b [m2]: the gain needs the force of the pressures')
+    bag = source.path
+    kind = source.infos[topic].type_name if topic in source.infos else ''
+    if kind not in _COMMAND_FIELDS:
+        what = f'is {kind}' if kind else 'is not in it'
+        raise BagError(f'{bag}: the command {topic} {what}: it has to be {" or ".join(_COMMAND_FIELDS)}')
+    (definition,) = read_definitions(bag, [kind]).values()
+    reader = Reader(definition, kind, [_COMMAND_FIELDS[kind]])
+
+    def number_of(data: bytes) -> float:
+        """The command of a message; ValueError if it is malformed or empty."""
+        (number,) = reader.read(data).numbers
+        if number is None:
+            raise ValueError('the array is empty')
+        return number
+
+    rows = read_velocity_rows(source, also={'command': (Wanted(topic, kind), number_of)})
+    are_told = np.isfinite(rows.columns[[1, 2, -1]]).all(axis=0)
+    velocity, a, b, _, position, *_, command = rows.columns[:, are_told]
+    time = np.asarray(rows.stamps[are_told] * 1e-9, np.float64)
+    with named_errors(f'{bag}: {topic}', raised=BagError):
+        return output_gain(CommandRecord(time, command, known.area_a * a - known.area_b * b, position, velocity))
 
 
 # -- parameter file ---------------------------------------------------------------------------------------------------

@@ -16,7 +16,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.foundation.errors import named_errors
@@ -59,69 +58,6 @@ class _Refusal(NamedTuple):
     reason: str
 
 
-class _Running:
-    """Calls on the cluster of a client that are not done yet."""
-
-    def __init__(self, client: Any, calls: Sequence[Callable[[], Any]]) -> None:
-        self.futures: dict[int, Any] = {}
-        self._client, self._calls = client, calls
-        self._done: SimpleQueue[int] = SimpleQueue()
-        self._start = (str(Path.cwd()), dict(versions()))
-
-    def begin(self, number: int) -> None:
-        """Submit a call."""
-        call = self._calls[number]
-        future = self._client.submit(_run, call, _paths_here(call), *self._start, pure=False)
-        self.futures[number] = future
-        self._tell(number)
-
-    def next_done(self) -> tuple[int, Outcome[Any]] | None:
-        """Number and outcome of a call that is done; None if there was none for a while.
-
-        ValueError: the scheduler has gone, or a worker refuses the call.
-        """
-        try:
-            number = self._done.get(timeout=_LOOK_PERIOD)
-        except Empty:
-            self._check_scheduler()
-            return None
-        future = self.futures.get(number)
-        if future is None:
-            return None
-        try:
-            answer = self._answer(future)
-        except TimeoutError:  # the worker with the result has gone: another one computes it again
-            self._check_scheduler()
-            self._tell(number)
-            return None
-        del self.futures[number]
-        if isinstance(answer, _Refusal):
-            raise ValueError(answer.reason)
-        return number, answer
-
-    def forget_after(self, number: int) -> None:
-        for later in [one for one in self.futures if one > number]:
-            self.futures.pop(later).release()
-
-    def _tell(self, number: int) -> None:
-        self.futures[number].add_done_callback(lambda _: self._done.put(number))
-
-    def _check_scheduler(self) -> None:
-        if self._client.status != 'running':
-            raise ValueError(_GONE)
-
-    def _answer(self, future: Any) -> Outcome[Any] | _Refusal:
-        if future.status in ('cancelled', 'lost'):
-            raise ValueError(_GONE)
-        if future.status == 'error':
-            error = future.exception(timeout=ANSWER_TIME)
-            if type(error).__name__ not in ('KilledWorker', 'MemoryError'):  # a bug is seen
-                sys.stderr.write(''.join(traceback.format_exception(error)))
-            return Outcome(None, CRASHED)
-        answer: Outcome[Any] | _Refusal = future.result(timeout=ANSWER_TIME)
-        return answer
-
-
 _GONE = (
     'the scheduler has gone before the work was done: start it and its workers again, then repeat the command; '
     'with --work FOLDER it goes on where it was'
@@ -139,24 +75,58 @@ def completed_on(
     """
     with _connected(cluster) as client:
         most = _CALLS_OF_A_WORKER * _checked_workers(client)
-        running, waiting = _Running(client, calls), list(range(len(calls)))[::-1]
-        lonely_since = None
-        while waiting or running.futures:
-            while waiting and len(running.futures) < most:
-                running.begin(waiting.pop())
-            done = running.next_done()
-            if done is None:
+        done = needed('distributed').as_completed(loop=client.loop)
+        numbers: dict[Any, int] = {}  # of the calls under way, by their futures
+        start = str(Path.cwd()), dict(versions())
+        waiting, lonely_since = list(range(len(calls)))[::-1], None
+        while waiting or numbers:
+            while waiting and len(numbers) < most:
+                call = calls[waiting[-1]]
+                future = client.submit(_run, call, _paths_here(call), *start, pure=False)
+                numbers[future] = waiting.pop()
+                done.add(future)
+            with done.thread_condition:
+                is_done = done.has_ready() or done.thread_condition.wait(_LOOK_PERIOD)
+            if not is_done:
                 lonely_since = _lonely_since(client, lonely_since)
                 continue
-            number, outcome = done
+            future = next(done)
+            if future not in numbers:
+                continue
+            try:
+                outcome = _answer(future)
+            except TimeoutError:  # the worker with the result has gone: another one computes it again
+                done.add(future)
+                lonely_since = _lonely_since(client, lonely_since)
+                continue
+            number = numbers.pop(future)
             if outcome.error and stop_at_error:
                 waiting.clear()
-                running.forget_after(number)
+                for later in [one for one, other in numbers.items() if other > number]:
+                    del numbers[later]
+                    later.release()
             yield number, outcome
 
 
+def _answer(future: Any) -> Outcome[Any]:
+    """Outcome of a call that is done; ValueError: the scheduler has gone, or the worker refuses the call."""
+    if future.status in ('cancelled', 'lost'):
+        raise ValueError(_GONE)
+    if future.status == 'error':
+        error = future.exception(timeout=ANSWER_TIME)
+        if type(error).__name__ not in ('KilledWorker', 'MemoryError'):  # a bug is seen
+            sys.stderr.write(''.join(traceback.format_exception(error)))
+        return Outcome(None, CRASHED)
+    answer: Outcome[Any] | _Refusal = future.result(timeout=ANSWER_TIME)
+    if isinstance(answer, _Refusal):
+        raise ValueError(answer.reason)
+    return answer
+
+
 def _lonely_since(client: Any, before: float | None) -> float | None:
-    """Time since when there is no worker; None if there is one."""
+    """Time since when there is no worker; None if there is one. ValueError: there is none for long, or no scheduler."""
+    if client.status != 'running':
+        raise ValueError(_GONE)
     if client.scheduler_info()['workers']:
         return None
     now = time.monotonic()

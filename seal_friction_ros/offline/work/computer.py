@@ -127,11 +127,14 @@ def _shared_memory(environment: Mapping[str, str]) -> Finding:
     return Finding(OK, 'shared memory', text)
 
 
-def _priority() -> Finding:
-    """Another process tries it: the priority of this one does not change."""
+def realtime_granted() -> bool:
+    """Whether the system grants this user a real-time priority; another process tries it, this one keeps its own."""
     attempt = 'import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))'
-    granted = subprocess.run([sys.executable, '-S', '-c', attempt], capture_output=True, check=False).returncode == 0
-    if granted:
+    return subprocess.run([sys.executable, '-S', '-c', attempt], capture_output=True, check=False).returncode == 0
+
+
+def _priority() -> Finding:
+    if realtime_granted():
         return Finding(OK, 'real-time priority', 'granted')
     hint = 'give the user an rtprio limit (/etc/security/limits.conf) or the process CAP_SYS_NICE'
     return Finding(NOTE, 'real-time priority', f'not granted: {hint}, or leave realtime_priority at 0')

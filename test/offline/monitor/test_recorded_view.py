@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from harness.browser import chromium
 from harness.closed_loop_bags import START, write_closed_loop
-from harness.example_bags import rewrite, write_inputs, write_recorded
+from harness.example_bags import read_whole, rewrite, write_inputs, write_recorded
 from harness.monitor_process import shown
 from harness.page_in_browser import violations
 from paths import ROOT
@@ -49,7 +49,7 @@ def column(view: RecordedView, name: str, since: float = -1.0, until: float = 1e
 )
 def test_a_curve_is_what_another_reader_finds_in_the_bag(loop: Path, name: str, attribute: str, unit: float):
     """Each row has the newest number that had come: those of the bag come every millisecond, the rows every ten."""
-    run, view = read_run(loop), RecordedView(loop).load()
+    run, view = read_run(loop), read_whole(RecordedView(loop))
     times, values = column(view, 'time'), column(view, name)
     given = np.asarray(getattr(run, attribute)) / unit
     newest = np.searchsorted(run.time, times - 1e-6, side='right') - 1
@@ -61,14 +61,14 @@ def test_a_curve_is_what_another_reader_finds_in_the_bag(loop: Path, name: str, 
 
 
 def test_the_tracking_error_is_reference_less_position(loop: Path):
-    run, view = read_run(loop), RecordedView(loop).load()
+    run, view = read_run(loop), read_whole(RecordedView(loop))
     assert np.nanmax(np.abs(column(view, 'error'))) == pytest.approx(
         1e6 * np.max(np.abs(run.reference - run.position)), rel=0.05
     )
 
 
 def test_a_window_has_the_rows_in_it_and_the_words_of_its_end(loop: Path):
-    view = RecordedView(loop).load()
+    view = read_whole(RecordedView(loop))
     frame = view.view('', 0.4, 0.9)
     times = [one[0] for one in frame['rows']]
     assert times[0] == pytest.approx(0.4, abs=0.011)
@@ -78,7 +78,7 @@ def test_a_window_has_the_rows_in_it_and_the_words_of_its_end(loop: Path):
 
 
 def test_faults_are_named_when_they_are_there_and_not_later():
-    view = RecordedView(ROOT / 'bags' / 'faults').load()
+    view = read_whole(RecordedView(ROOT / 'bags' / 'faults'))
     duration = view.describe()['duration']
     words = [view.view('', at, at)['now']['faults'] for at in np.arange(0.1, duration, 0.1)]
     named = {fault for moment in words for fault in moment}
@@ -96,12 +96,12 @@ def test_a_bag_says_where_its_first_estimate_is_and_where_its_faults_are(tmp_pat
         writer.write(*pressure._replace(log_time=messages[0].log_time))
         for message in messages:
             writer.write(*message._replace(log_time=message.log_time + 2 * 10**9))
-    about, late = RecordedView(source).load().describe(), RecordedView(tmp_path / 'late').load().describe()
+    about, late = read_whole(RecordedView(source)).describe(), read_whole(RecordedView(tmp_path / 'late')).describe()
     assert late['first'] == pytest.approx(about['first'] + 2.0, abs=0.03)
     ((label, faults),) = about['faults'].items()
     assert any('pressure is not a finite number' in words for _, _, words in faults)
     assert len(faults) < 200
-    view = RecordedView(source).load()
+    view = read_whole(RecordedView(source))
     marked = [any(begin <= at <= end for begin, end, _ in faults) for at in np.arange(0.5, about['duration'], 0.01)]
     rows = view.view(label, -1.0)['rows']
     serious = [one[0] for one in rows if serious_words(one[-2])]
@@ -115,25 +115,25 @@ def test_a_stretch_without_estimates_is_a_fault(tmp_path: Path):
     def without(_: int, message: BagMessage) -> BagMessage | None:
         return None if 2.0e9 < message.log_time < 3.0e9 and message.type_name == ESTIMATE_TYPE else message
 
-    view = RecordedView(rewrite(recorded, tmp_path / 'gap', without)).load()
+    view = read_whole(RecordedView(rewrite(recorded, tmp_path / 'gap', without)))
     (faults,) = view.describe()['faults'].values()
     rows = view.view('', -1.0)['rows']  # from 1 s of the bag on
     missing = [one[COLUMNS.index('estimate')] for one in rows if 1.05 < one[0] < 1.95]
     assert missing == [None] * len(missing) != []
     assert any('no estimate' in words and begin <= 1.55 and end >= 1.95 for begin, end, words in faults)
-    (faults,) = RecordedView(recorded).load().describe()['faults'].values()
+    (faults,) = read_whole(RecordedView(recorded)).describe()['faults'].values()
     assert not any('no estimate' in words for _, _, words in faults)
 
 
 def test_what_is_before_the_start_and_after_the_end_is_the_nearest_moment(loop: Path):
-    view = RecordedView(loop).load()
+    view = read_whole(RecordedView(loop))
     assert view.view('', -5.0, -1.0)['rows']
     assert view.view('', 1e6, 1e6)['time'] == view.describe()['duration']
 
 
 def test_a_long_bag_has_no_more_rows_than_fit(loop: Path, monkeypatch):
     monkeypatch.setattr('seal_friction_ros.offline.monitor.recorded_view.MOST_ROWS', 50)
-    view = RecordedView(loop).load()
+    view = read_whole(RecordedView(loop))
     assert 45 <= len(column(view, 'time')) <= 52
     assert column(view, 'time')[-1] == pytest.approx(view.describe()['duration'], abs=0.05)
 
@@ -150,20 +150,20 @@ def test_a_fault_of_one_estimate_is_marked_however_far_the_rows_are_apart(tmp_pa
         return message._replace(data=encode(estimate._replace(status=int(Status.FORCE_NOT_FINITE))))
 
     monkeypatch.setattr('seal_friction_ros.offline.monitor.recorded_view.MOST_ROWS', 50)
-    (faults,) = RecordedView(rewrite(bag, tmp_path / 'fault', once)).load().describe()['faults'].values()
+    (faults,) = read_whole(RecordedView(rewrite(bag, tmp_path / 'fault', once))).describe()['faults'].values()
     ((begin, end, words),) = faults
     assert begin - 0.06 <= 2.0 <= end
     assert words == 'the force sum is not a finite number'
 
 
 def test_a_bag_is_shown_from_its_first_estimate_on_while_the_rest_is_read(loop: Path):
-    view, whole = RecordedView(loop), RecordedView(loop).load().view('', -1.0, 1.0)
+    view, whole = RecordedView(loop), read_whole(RecordedView(loop)).view('', -1.0, 1.0)
     about = view.describe()
     assert about['first'] <= about['loaded'] < 0.2 < about['duration']
     early = view.view('', -1.0, 1.0)
     assert early['time'] == about['loaded']
     assert early['rows'] == whole['rows'][: len(early['rows'])] != []
-    view.load()
+    read_whole(view)
     assert view.describe()['loaded'] == about['duration']
     assert view.view('', -1.0, 1.0) == whole
 
@@ -187,7 +187,7 @@ def test_the_page_shows_how_far_a_bag_has_been_read_and_follows(loop: Path):
 
 @pytest.mark.skipif(not chromium(), reason='no Chromium: apt-get install chromium')
 def test_the_view_of_a_bag_is_for_people_without_a_mouse_too():
-    view = RecordedView(ROOT / 'bags' / 'faults').load()
+    view = read_whole(RecordedView(ROOT / 'bags' / 'faults'))
     server = MonitorServer(view)
     server.start()
     try:
@@ -226,7 +226,7 @@ def test_damage_ends_what_is_shown_and_the_verdict_says_so(tmp_path: Path):
     content = bytearray(file.read_bytes())
     content[len(content) // 2] ^= 255  # in the messages of a chunk
     file.write_bytes(content)
-    view = RecordedView(damaged).load()
+    view = read_whole(RecordedView(damaged))
     now = view.view('', -1.0)['now']
     assert now['verdict'] == 'bad'
     assert now['reason'].startswith('not read to its end')
@@ -239,13 +239,13 @@ def test_a_file_that_is_gone_is_not_to_be_recovered(tmp_path: Path):
             writer.write(*message)
     view = RecordedView(tmp_path / 'split')
     max(tmp_path.glob('split/*.mcap')).unlink()
-    now = view.load().view('', -1.0)['now']
+    now = read_whole(view).view('', -1.0)['now']
     assert (now['verdict'], now['next']) == ('bad', 'mend what it names: what comes after it is not shown')
 
 
 def test_the_overview_has_the_friction_and_the_reversals_of_the_whole_bag(loop: Path):
     run = read_run(loop)
-    view = RecordedView(loop).load()
+    view = read_whole(RecordedView(loop))
     ((_, overview),) = view.describe()['overview'].items()
     forces = column(view, 'estimate')
     time, low, high = np.array(overview['curve'], float).T

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from harness.closed_loop_bags import write_closed_loop
-from harness.example_bags import as_recorded, rewrite
+from harness.example_bags import as_recorded, read_whole, rewrite
 from harness.report_page import checked_page
 from harness.simulated_day import Day, write_day
 from paths import ROOT
@@ -132,7 +132,7 @@ def by_compare(bags, name, tmp_path, capsys):
 
 
 def by_live_view(bags, name, tmp_path, capsys):
-    now = RecordedView(bags / name).load().view('', -1.0)['now']
+    now = read_whole(RecordedView(bags / name)).view('', -1.0)['now']
     return now['verdict'], now['reason']
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from harness.example_bags import write_inputs
 
-from seal_friction_ros.offline.bags.find_bags import find_bags
+from seal_friction_ros.offline.work.places import find_bags
 
 
 @pytest.fixture
