@@ -1,8 +1,9 @@
-"""Exported FMUs simulate what Python computes, and the exported C builds with clang, too."""
+"""Exported FMUs simulate what Python computes, the exported C builds with clang, too, and the C++ of the docs runs."""
 
 import ctypes
 import dataclasses
 import math
+import os
 import re
 import subprocess
 import sys
@@ -148,18 +149,56 @@ int main() {
 """
 
 
-def test_the_controller_of_the_docs_adds_a_force_that_fades_when_upstream_stops(tmp_path: Path):
-    """Against stand-ins of the headers of ros2_control."""
+def built_from_docs(word: str, driver: str, folder: Path, *arguments: str) -> list[float]:
+    """What a driver prints that includes the C++ of docs/controllers.md with a word in it.
+
+    The headers of ros2_control and rclcpp are stand-ins, those of the messages the real ones.
+    """
     page = (ROOT / 'docs' / 'controllers.md').read_text()
-    (source,) = (text for text in re.findall(r'```cpp\n(.*?)```', page, re.DOTALL) if 'seal_friction.h' in text)
-    files = {'controller.cpp': source, 'driver.cpp': DRIVER, **sources(PARAMETERS, '{}', 'seal_friction')}
-    for name, text in files.items():
+    (source,) = (text for text in re.findall(r'```cpp\n(.*?)```', page, re.DOTALL) if word in text)
+    (folder / 'controller.cpp').write_text(source)
+    (folder / 'driver.cpp').write_text(driver)
+    prefixes = [Path(sys.prefix), *map(Path, filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(':')))]
+    messages = [f'-isystem{each}' for prefix in prefixes for each in sorted(prefix.glob('include/*'))]
+    headers = ['-I', str(ROOT / 'test' / 'harness' / 'ros2_control'), *messages]
+    flags = ['-std=c++17', '-O0', '-Wall', '-Wextra', '-Werror']
+    subprocess.run(['c++', *flags, *headers, 'driver.cpp', *arguments, '-o', 'driver'], cwd=folder, check=True)
+    printed = subprocess.run(['./driver'], cwd=folder, check=True, capture_output=True, text=True).stdout
+    return [float(number) for number in printed.split()]
+
+
+def test_the_controller_of_the_docs_adds_a_force_that_fades_when_upstream_stops(tmp_path: Path):
+    for name, text in sources(PARAMETERS, '{}', 'seal_friction').items():
         (tmp_path / name).write_text(text)
     subprocess.run(['cc', '-std=c11', '-O0', '-c', 'seal_friction.c'], cwd=tmp_path, check=True)
-    headers = ROOT / 'test' / 'harness' / 'ros2_control'
-    flags = ['-std=c++17', '-O0', '-Wall', '-Wextra', '-Werror', '-I', str(headers)]
-    subprocess.run(['c++', *flags, 'driver.cpp', 'seal_friction.o', '-o', 'driver'], cwd=tmp_path, check=True)
-    printed = subprocess.run(['./driver'], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
-    before, moving, stopped = map(float, printed.split())
+    before, moving, stopped = built_from_docs('seal_friction.h', DRIVER, tmp_path, 'seal_friction.o')
     assert (before, stopped) == (0.0, 5.0)  # [N]
     assert moving > 6.0
+
+
+SUBSCRIBER = """
+#include "controller.cpp"
+#include <cstdio>
+
+int main() {
+  using Message = seal_friction_msgs::msg::FrictionFeedForward;
+  rclcpp::Node node;
+  FeedForward feedforward(node);
+  auto subscription = std::static_pointer_cast<rclcpp::Subscription<Message>>(node.newest.lock());
+  auto told = [&] (int64_t milliseconds) {
+    node.get_clock()->time = 1700000000000000000 + 1000000 * milliseconds;
+    std::printf("%g\\n", feedforward.force());
+  };
+  told(0);
+  Message message;
+  message.header.stamp.sec = 1700000000;
+  message.force = 7.5;
+  subscription->take(message);
+  for (int64_t age : {0, 49, 51, -49, -51}) told(age);
+  return subscription->topic != "friction_feedforward";
+}
+"""
+
+
+def test_the_subscriber_of_the_docs_gives_the_force_while_it_is_fresh(tmp_path: Path):
+    assert built_from_docs('class FeedForward', SUBSCRIBER, tmp_path) == [0.0, 7.5, 7.5, 0.0, 7.5, 0.0]  # [N]
