@@ -123,7 +123,7 @@ def sources(parameters: pipeline.PipelineParameters, document: str, name: str) -
     try:
         values = {
             'name': name, 'NAME': name.upper(), 'mark': mark('export'), 'hash': digest(document),
-            'version': f'{package_version()}, algorithm {ALGORITHM_VERSION}', **_parts(parameters, name),
+            'version': f'{package_version()}, algorithm {ALGORITHM_VERSION}', **_parts(parameters, document, name),
         }  # fmt: skip
     except UntranslatableError as error:
         raise ValueError(f'no C for this configuration: {error}') from None
@@ -137,7 +137,7 @@ def filled(template: str, values: dict[str, str]) -> str:
     return Template((TEMPLATES / template).read_text(encoding='utf-8')).substitute(values)
 
 
-def _parts(parameters: pipeline.PipelineParameters, name: str) -> dict[str, str]:
+def _parts(parameters: pipeline.PipelineParameters, document: str, name: str) -> dict[str, str]:
     """What the templates leave open: structs and functions."""
     types = Types(name)
     for kind in (pipeline.PipelineState, LoopSample, ANSWERS, RodLoad, StateFriction, *MESSAGES):
@@ -160,6 +160,7 @@ def _parts(parameters: pipeline.PipelineParameters, name: str) -> dict[str, str]
         'structs': structs,
         'enums': '\n'.join(_enum(kind, name) for kind in (Status, FrictionState, Limited)),
         'state_size': str(len(places)),
+        'layout': digest(f'{document} {places}')[:16],
         'receivers': '\n'.join(f'{head};' for head in heads),
         'bodies': '\n'.join(f'{head}\n{body}' for head, body in zip(heads, bodies, strict=True)),
         'types': '\n'.join(types.declarations),
