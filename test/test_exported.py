@@ -7,7 +7,8 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from paths import ROOT
 from seal_friction_ros import Estimator
 from seal_friction_ros.core.estimation.loop import LoopSample, RodLoad, friction_on_rod, receive_sample
 from seal_friction_ros.core.estimation.pipeline import init
+from seal_friction_ros.core.friction.states import StateFriction
 from seal_friction_ros.core.messages.records import FeedForward, FrictionEstimate
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.export.c_library import sources
@@ -105,6 +107,38 @@ def test_a_refused_step_takes_no_time_and_no_token_makes_no_instance(exported):
         function = fmu.dll[f'fmi{"2Instantiate" if isinstance(fmu, FMU2Slave) else "3InstantiateCoSimulation"}']
         function.restype, function.argtypes = ctypes.c_void_p, None
         assert function(*[None] * 12) is None
+
+
+def test_garbage_makes_no_garbage_and_a_reset_instance_is_a_new_one(exported):
+    model, path = exported
+    is_estimator = model == 'estimator'
+    outputs = FrictionEstimate._fields[1:] if is_estimator else StateFriction._fields
+    given = [sample if is_estimator else RodLoad(*sample[1:5]) for sample in samples()]
+    numbers, random = (math.nan, math.inf, -math.inf, 5e-324, 1e308, -1e308, -0.0, 3e6), np.random.default_rng(4)
+    garbage = [type(one)(*random.choice(numbers, len(one)).tolist()) for one in given]
+
+    def ran(fmu: Any, variables: dict[str, Any], inputs: list[Any], starts: Sequence[float]) -> Iterator[list[float]]:
+        for at, one in zip(starts, inputs, strict=True):
+            put(fmu, variables, one)
+            with suppress(FMICallException):  # a time that is none
+                fmu.doStep(at, STEP)
+            yield got(fmu, variables, outputs)
+
+    times = [i * STEP for i in range(len(given))]
+    with running(path) as (bad, variables), running(path) as (good, _):
+        pairs = zip(
+            ran(bad, variables, garbage, random.choice([*numbers, 0.1, -0.1], len(given)).tolist()),
+            ran(good, variables, given, times), strict=True,
+        )  # fmt: skip
+        alone = []
+        for of_garbage, of_samples in pairs:
+            assert np.all(np.isfinite(of_garbage))
+            alone.append(of_samples)
+        for reference in (99, variables[outputs[0]].valueReference):  # of nothing, and of an output
+            with pytest.raises(FMICallException):
+                (bad.setReal if isinstance(bad, FMU2Slave) else bad.setFloat64)([reference], [1.0])
+        bad.reset()
+        assert list(ran(bad, variables, given, times)) == alone
 
 
 def test_the_sources_in_the_fmu_build_with_clang_without_a_warning(exported):
