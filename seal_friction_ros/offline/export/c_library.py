@@ -8,7 +8,7 @@ import hashlib
 import re
 import shutil
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import make_dataclass
 from pathlib import Path
 from string import Template
@@ -99,12 +99,8 @@ def digest(document: str) -> str:
 
 def example_samples() -> str:
     """CSV of a second at 1 kHz, in which the rod goes to and fro once."""
-    rows = [
-        f'{i}000000,{speed!r},3e6,1e6,{800.0 * speed!r},{speed!r},0.0,'
-        for i in range(1000)
-        for speed in [0.05 if i < 500 else -0.05]
-    ]
-    return '\n'.join([','.join(LoopSample._fields), *rows, ''])
+    speeds = [0.05] * 500 + [-0.05] * 500  # [m/s]
+    return _csv(f'{i}000000,{v},3e6,1e6,{800.0 * v},{v},0.0,' for i, v in enumerate(speeds))
 
 
 def samples_of(bag: Path) -> str:
@@ -112,8 +108,11 @@ def samples_of(bag: Path) -> str:
     run = read_run(bag)
     columns = run.time, run.velocity, run.pressure_a, run.pressure_b, run.force_sum
     rows = zip(*(column.tolist() for column in columns), strict=True)
-    lines = [f'{round(time * 1e9)},{",".join(map(repr, values))},,,' for time, *values in rows]
-    return '\n'.join([','.join(LoopSample._fields), *lines, ''])
+    return _csv(f'{round(time * 1e9)},{",".join(map(repr, values))},,,' for time, *values in rows)
+
+
+def _csv(rows: Iterable[str]) -> str:
+    return '\n'.join([','.join(LoopSample._fields), *rows, ''])
 
 
 def sources(parameters: pipeline.PipelineParameters, document: str, name: str) -> dict[str, str]:

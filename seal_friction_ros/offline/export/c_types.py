@@ -1,7 +1,6 @@
 """Types and values of Python in C: records become structs, whole numbers ``int64_t``, constants initialisers."""
 
 import inspect
-import math
 import re
 from functools import cache
 from typing import Any, NamedTuple, get_type_hints
@@ -90,14 +89,10 @@ def number(value: Any) -> str:
     """Literal of C for a number, to the last bit."""
     if isinstance(value, bool):
         return 'true' if value else 'false'
-    if isinstance(value, int):
-        if value == -(2**63):
-            return 'INT64_MIN'
-        text = str(value) if abs(value) < 2**31 else f'INT64_C({abs(value)})'.replace('(', '(-' if value < 0 else '(')
-        return f'({text})' if text.startswith('-') else text
-    if math.isfinite(value):
-        return repr(value) if math.copysign(1.0, value) > 0.0 else f'({value!r})'
-    return 'NAN' if math.isnan(value) else 'INFINITY' if value > 0.0 else '(-INFINITY)'
+    text = str(value).replace('inf', 'INFINITY').replace('nan', 'NAN')
+    if isinstance(value, int) and abs(value) >= 2**31:
+        text = 'INT64_MIN' if value == -(2**63) else f'{text}LL'
+    return f'({text})' if text[0] == '-' else text
 
 
 def initialiser(value: Any) -> str:

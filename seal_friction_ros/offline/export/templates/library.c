@@ -9,6 +9,11 @@
 #ifdef __clang__
 #pragma STDC FP_CONTRACT OFF
 #endif
+#ifdef __GNUC__ /* what no branch of this configuration reads */
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#pragma GCC diagnostic ignored "-Wunused-variable"
+#pragma GCC diagnostic ignored "-Wunused-but-set-variable"
+#endif
 
 ${types}
 ${functions}
