@@ -117,7 +117,7 @@ def _built(files: dict[str, str]) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         for name, text in files.items():
             (Path(folder) / name).write_text(text, encoding='utf-8')
-        flags = '-std=c11 -O2 -ffp-contract=off -fPIC -shared -Wl,-Bsymbolic'
+        flags = '-std=c11 -O2 -fPIC -shared -Wl,-Bsymbolic'
         command = ['cc', *flags.split(), '-o', 'fmu.so', *(name for name in files if name.endswith('.c')), '-lm']
         build(command, Path(folder))
         return (Path(folder) / 'fmu.so').read_bytes()

@@ -8,6 +8,8 @@
 #endif
 #ifdef __clang__
 #pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__)
+#pragma GCC optimize("fp-contract=off")
 #endif
 #ifdef __GNUC__ /* what no branch of this configuration reads */
 #pragma GCC diagnostic ignored "-Wunused-parameter"
