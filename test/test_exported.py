@@ -65,6 +65,9 @@ def test_a_simulation_of_the_fmu_is_that_of_python_to_the_bit(exported):
     answers: list[Any] = []
     state = init(PARAMETERS)
     with running(path) as (fmu, variables):
+        if model == 'friction':  # before any input
+            expected = friction_on_rod(PARAMETERS.estimator, RodLoad(0.0, 0.0, 0.0))
+            assert got(fmu, variables, [*expected._fields]) == list(expected)
         for i, sample in enumerate(samples()):
             if model == 'estimator':
                 answers.clear()

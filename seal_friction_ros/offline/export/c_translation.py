@@ -12,7 +12,6 @@ The C computes what Python computes, operation by operation: IEEE double precisi
 import ast
 import inspect
 import math
-import re
 import textwrap
 from bisect import bisect_right
 from collections import Counter
@@ -41,28 +40,6 @@ from seal_friction_ros.offline.export.c_types import (
     unified,
 )
 
-PRELUDE = {
-    'add': 'int64_t add(int64_t a, int64_t b) { return (int64_t)((uint64_t)a + (uint64_t)b); }',
-    'subtract': 'int64_t subtract(int64_t a, int64_t b) { return (int64_t)((uint64_t)a - (uint64_t)b); }',
-    'multiply': 'int64_t multiply(int64_t a, int64_t b) { return (int64_t)((uint64_t)a * (uint64_t)b); }',
-    'absolute': 'int64_t absolute(int64_t a) { return a < 0 ? (int64_t)(0 - (uint64_t)a) : a; }',
-    'smaller': 'double smaller(double a, double b) { return b < a ? b : a; }',
-    'larger': 'double larger(double a, double b) { return b > a ? b : a; }',
-    'smaller_integer': 'int64_t smaller_integer(int64_t a, int64_t b) { return b < a ? b : a; }',
-    'larger_integer': 'int64_t larger_integer(int64_t a, int64_t b) { return b > a ? b : a; }',
-    # volatile: a compiler turns a power of 2 that it knows into a product, which rounds differently
-    'power': 'double power(double a, double b) { volatile double exponent = b; return pow(a, exponent); }',
-    'last_place': """int64_t last_place(const double *knots, int64_t n, double x) {
-    int64_t low = 0, high = n;
-    while (low < high) {
-        int64_t middle = (low + high) / 2;
-        if (x < knots[middle]) high = middle; else low = middle + 1;
-    }
-    return low;
-}""",
-}
-"""Functions that the translated ones call: whole numbers wrap around; of two numbers Python chooses like this."""
-
 _WHOLE = {ast.Add: 'add', ast.Sub: 'subtract', ast.Mult: 'multiply'}
 _BITS = {ast.BitAnd: '&', ast.BitOr: '|', ast.BitXor: '^'}
 _REAL = {ast.Add: '+', ast.Sub: '-', ast.Mult: '*', ast.Div: '/'}
@@ -76,7 +53,8 @@ _TESTS = {math.isnan: 'isnan', math.isinf: 'isinf', math.isfinite: 'isfinite'}
 _RESERVED = {
     'auto', 'break', 'case', 'char', 'const', 'default', 'do', 'double', 'enum', 'extern', 'float', 'goto', 'inline',
     'int', 'long', 'register', 'restrict', 'short', 'signed', 'sizeof', 'static', 'struct', 'switch', 'typedef',
-    'union', 'unsigned', 'void', 'volatile', 'bool', 'true', 'false', *_OF_MATH.values(), *_TESTS.values(), *PRELUDE,
+    'union', 'unsigned', 'void', 'volatile', 'bool', 'true', 'false', *_OF_MATH.values(), *_TESTS.values(),
+    *_WHOLE.values(), 'absolute', 'smaller', 'larger', 'smaller_integer', 'larger_integer', 'last_place',
 }  # fmt: skip
 
 
@@ -94,10 +72,8 @@ class Translation:
     @property
     def text(self) -> str:
         """Everything, in the order that C wants."""
-        functions = '\n'.join(self._functions.values())
         constants = [f'static const {text.replace("@", name)};' for text, name in self._constants.items()]
-        helpers = [f'static inline {text}' for name, text in PRELUDE.items() if re.search(rf'\b{name}\(', functions)]
-        return '\n'.join([*helpers, '', *constants, '', functions])
+        return '\n'.join([*constants, '', *self._functions.values()])
 
     def constant(self, value: Any) -> str:
         """Name of a constant of a record, or of a table of numbers."""

@@ -12,10 +12,34 @@
 #pragma GCC optimize("fp-contract=off")
 #endif
 #ifdef __GNUC__ /* what no branch of this configuration reads */
+#pragma GCC diagnostic ignored "-Wunused-function"
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #pragma GCC diagnostic ignored "-Wunused-variable"
 #pragma GCC diagnostic ignored "-Wunused-but-set-variable"
 #endif
+
+/* What C computes otherwise than Python: whole numbers wrap around as in compiled replay; of two numbers Python chooses
+ * like this; a compiler turns a power of 2 that it knows into a product, which rounds differently. */
+static inline int64_t add(int64_t a, int64_t b) { return (int64_t)((uint64_t)a + (uint64_t)b); }
+static inline int64_t subtract(int64_t a, int64_t b) { return (int64_t)((uint64_t)a - (uint64_t)b); }
+static inline int64_t multiply(int64_t a, int64_t b) { return (int64_t)((uint64_t)a * (uint64_t)b); }
+static inline int64_t absolute(int64_t a) { return a < 0 ? (int64_t)(0 - (uint64_t)a) : a; }
+static inline double smaller(double a, double b) { return b < a ? b : a; }
+static inline double larger(double a, double b) { return b > a ? b : a; }
+static inline int64_t smaller_integer(int64_t a, int64_t b) { return b < a ? b : a; }
+static inline int64_t larger_integer(int64_t a, int64_t b) { return b > a ? b : a; }
+static inline double power(double a, double b) { volatile double exponent = b; return pow(a, exponent); }
+
+/* Number of knots up to x, as bisect_right. */
+static inline int64_t last_place(const double *knots, int64_t n, double x)
+{
+    int64_t low = 0, high = n;
+    while (low < high) {
+        int64_t middle = (low + high) / 2;
+        if (x < knots[middle]) high = middle; else low = middle + 1;
+    }
+    return low;
+}
 
 ${types}
 ${functions}
