@@ -226,9 +226,8 @@ class _Body:
     def _set_together(self, targets: Sequence[ast.expr], values: Sequence[Value]) -> None:
         """All at once: no target changes what another one is set to."""
         pairs = [(t, v) for t, v in zip(targets, values, strict=True) if ast.unparse(t) != '_']
-        if len(pairs) > 1:
-            pairs = [(t, self._temporary(v) if isinstance(v, Runtime) else v) for t, v in pairs]
-        for target, value in pairs:
+        held = [self._temporary(v) if isinstance(v, Runtime) else v for _, v in pairs]
+        for (target, _), value in zip(pairs, held, strict=True):
             self._set(target, value)
 
     def _set(self, target: ast.expr, value: Value) -> None:

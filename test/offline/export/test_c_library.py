@@ -39,8 +39,7 @@ from seal_friction_ros.core.messages.records import (
 from seal_friction_ros.offline.bags.actuator_bag import open_actuator
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.export.c_library import digest, example_samples, sources
-from seal_friction_ros.offline.export.c_translation import Translation
-from seal_friction_ros.offline.export.c_types import Runtime, Types, UntranslatableError, meanings_of
+from seal_friction_ros.offline.export.c_types import meanings_of
 from seal_friction_ros.offline.replay.replay import Replay
 
 BAGS = ('pull_test', 'faults')
@@ -334,42 +333,6 @@ def test_a_stamp_that_goes_back_is_taken_with_its_status(fresh: CEstimator):
         answers = fresh.step(LoopSample(stamp, 0.05, 3e6, 1e6))
     (estimate,) = [one for one in (decode(*each) for each in answers) if isinstance(one, FrictionEstimate)]
     assert estimate.status & Status.STAMP_NOT_INCREASING
-
-
-def number_or(a: float, b: float) -> float:
-    return a or b
-
-
-def one_or_other(a: float, b: float) -> float:
-    limit: tuple[()] | None = None
-    if a > b:
-        limit = ()
-    return a if limit is None else b
-
-
-def loop_with_else(a: float, b: float) -> float:
-    for each in (1.0, 2.0):
-        if a > each:
-            break
-    else:
-        return b
-    return a
-
-
-def remainder(a: float, b: float) -> float:
-    return a % b
-
-
-def waits(a: float, b: float) -> float:
-    while a > b:
-        b += 1.0
-    return b
-
-
-@pytest.mark.parametrize('law', [number_or, one_or_other, loop_with_else, remainder, waits])
-def test_python_that_c_would_compute_otherwise_is_refused_by_name(law):
-    with pytest.raises(UntranslatableError, match=f'test_c_library.{law.__name__}'):
-        Translation(Types('rod')).function(law, [Runtime('', float), Runtime('', float)])
 
 
 class Odd(NamedTuple):
