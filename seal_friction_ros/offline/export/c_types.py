@@ -49,7 +49,7 @@ def meanings_of(kind: Any) -> dict[str, str]:
     """Comment of each field in the source of a record."""
     try:
         source = inspect.getsource(kind)
-    except (OSError, TypeError):  # a record that no source declares
+    except (OSError, TypeError):  # a tuple, or a record that no source declares
         return {}
     found = re.findall(r'^    (\w+): .*?  # (.*)$', source, re.MULTILINE)
     return {name: _comment(text) for name, text in found}
@@ -77,8 +77,6 @@ def unified(first: Any, second: Any) -> Any:
     """Kind that holds the values of both."""
     if first == second:
         return first
-    if isinstance(first, tuple) and isinstance(second, tuple) and len(first) == len(second):
-        return tuple(map(unified, first, second))
     numbers = [bool, int, float]
     if first in numbers and second in numbers:
         return numbers[max(numbers.index(first), numbers.index(second))]
@@ -128,7 +126,7 @@ class Types:
         return self._names[kind]
 
     def _member(self, kind: Any, name: str, each: Any) -> str:
-        meaning = '' if isinstance(kind, tuple) else meanings_of(kind).get(name, '')
+        meaning = meanings_of(kind).get(name)
         return f'    {self.name(each)} {name};' + (f' /* {meaning} */' if meaning else '')
 
     def _new_name(self, kind: Any) -> str:
