@@ -207,14 +207,22 @@ class _Body:
     def _do_assign(self, node: ast.Assign) -> None:
         first, *others = node.targets
         if isinstance(first, ast.Tuple):
-            is_tuple = isinstance(node.value, ast.Tuple)
-            elements = cast(ast.Tuple, node.value).elts if is_tuple else []
+            elements = node.value.elts if isinstance(node.value, ast.Tuple) else []
             values = [self._value(each) for each in elements] or self._members(self._value(node.value))
-            self._set_together(first.elts, values)
+            copies = [self._temporary(each) if isinstance(each, Runtime) else each for each in values]
+            for target, copy in zip(first.elts, copies, strict=True):  # no target changes what another one is set to
+                if ast.unparse(target) != '_':
+                    self._set(target, copy)
         else:
             self._set(first, self._value(node.value))
         for other in others:
             self._set(other, self._value(_as_read(first)))
+
+    def _do_augassign(self, node: ast.AugAssign) -> None:
+        self._set(node.target, self._value(ast.BinOp(_as_read(node.target), node.op, node.value)))
+
+    def _do_annassign(self, node: ast.AnnAssign) -> None:
+        self._set(node.target, self._value(cast(ast.expr, node.value)))
 
     def _members(self, value: Value) -> list[Value]:
         """Members of a record or tuple, which is computed once."""
@@ -222,13 +230,6 @@ class _Body:
             return [Static(each) for each in value.value]
         held = self._temporary(value) if '(' in value.code else value
         return [self._attribute(held, name) for name in field_names(held.kind) or fields_of(held.kind)]
-
-    def _set_together(self, targets: Sequence[ast.expr], values: Sequence[Value]) -> None:
-        """All at once: no target changes what another one is set to."""
-        pairs = [(t, v) for t, v in zip(targets, values, strict=True) if ast.unparse(t) != '_']
-        held = [self._temporary(v) if isinstance(v, Runtime) else v for _, v in pairs]
-        for (target, _), value in zip(pairs, held, strict=True):
-            self._set(target, value)
 
     def _set(self, target: ast.expr, value: Value) -> None:
         if isinstance(target, ast.Name):
@@ -447,35 +448,9 @@ class _Body:
         raise UntranslatableError(f'no C for {function!r}')
 
 
-# -- syntax -----------------------------------------------------------------------------------------------------------
-
-
-class _Plain(ast.NodeTransformer):
-    """Syntax in its plain form."""
-
-    def visit_AugAssign(self, node: ast.AugAssign) -> ast.stmt:
-        """``a += b`` is ``a = a + b``."""
-        self.generic_visit(node)
-        return ast.Assign([node.target], ast.BinOp(_as_read(node.target), node.op, node.value))
-
-    def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.stmt:
-        """The type is told by the value."""
-        self.generic_visit(node)
-        return ast.Assign([node.target], cast(ast.expr, node.value))
-
-    def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
-        """A choice of tuples is a tuple of choices."""
-        self.generic_visit(node)
-        if not (isinstance(node.body, ast.Tuple) and isinstance(node.orelse, ast.Tuple)):
-            return node
-        pairs = zip(node.body.elts, node.orelse.elts, strict=True)
-        return ast.Tuple([ast.IfExp(node.test, *pair) for pair in pairs], ast.Load())
-
-
 @cache
 def _tree_of(function: Any) -> ast.FunctionDef:
-    tree = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
-    return cast(ast.FunctionDef, ast.fix_missing_locations(_Plain().visit(tree)))
+    return cast(ast.FunctionDef, ast.parse(textwrap.dedent(inspect.getsource(function))).body[0])
 
 
 _hints_of = cache(get_type_hints)
