@@ -152,16 +152,17 @@ def _parts(parameters: pipeline.PipelineParameters, document: str, name: str) ->
         receive, _ = translation.function(pipeline.receive, [known, state, Runtime('', kind), time, answers, time])
         given = f'{name}_pipeline_state *state, {types.name(kind)} message'
         times = f'int64_t received, int64_t sent, {name}_answers *answers'
-        heads.append(f'bool {name}_receive_{snake(kind.__name__)}({given}, {times})')
-        bodies.append(f'{{\n    RECEIVE({receive})\n}}\n')
+        head = f'bool {name}_receive_{snake(kind.__name__)}({given}, {times})'
+        heads.append(f'{head};')
+        bodies.append(f'{head}\n{{\n    RECEIVE({receive})\n}}\n')
     places = list(_places(pipeline.PipelineState, 'state->'))
     return {
         'structs': structs,
         'enums': '\n'.join(_enum(kind, name) for kind in (Status, FrictionState, Limited)),
         'state_size': str(len(places)),
         'layout': digest(f'{document} {places}')[:16],
-        'receivers': '\n'.join(f'{head};' for head in heads),
-        'bodies': '\n'.join(f'{head}\n{body}' for head, body in zip(heads, bodies, strict=True)),
+        'receivers': '\n'.join(heads),
+        'bodies': '\n'.join(bodies),
         'types': '\n'.join(types.declarations),
         'functions': translation.text,
         'first': initialiser(pipeline.init(parameters)),

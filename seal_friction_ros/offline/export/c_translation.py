@@ -66,7 +66,6 @@ class Translation:
         self._functions: dict[str, str] = {}  # name in C -> text
         self._known: dict[Any, tuple[str, Any]] = {}  # function and its arguments -> name in C, kind of its value
         self._constants: dict[str, str] = {}  # declaration without name -> name
-        self._alike = Counter[str]()  # functions of one name
         self._kept: list[Any] = []  # static arguments: their addresses are keys
 
     @property
@@ -90,8 +89,7 @@ class Translation:
             body = _Body(self, function, arguments)
             module = function.__module__.rpartition('.')[2].capitalize()  # no --name begins with a capital
             name, lines = f'{module}_{function.__name__.strip("_")}', body.lines()
-            self._alike[name] += 1
-            name += f'_v{self._alike[name]}' if self._alike[name] > 1 else ''
+            name += f'_V{len(self._functions)}' if name in self._functions else ''  # no function has a capital
             self._functions[name] = '\n'.join([f'/* {first_line(function)} */', body.head(name), '{', *lines, '}', ''])
             self._known[key] = name, body.returned
         return self._known[key]
