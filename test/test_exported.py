@@ -1,12 +1,14 @@
-"""Exported FMUs simulate what Python computes, and the exported C builds with clang, too."""
+"""Exported FMUs simulate what Python computes, the exported C builds with clang, too, and the C++ of the docs runs."""
 
 import ctypes
 import dataclasses
 import math
+import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +25,7 @@ from paths import ROOT
 from seal_friction_ros import Estimator
 from seal_friction_ros.core.estimation.loop import LoopSample, RodLoad, friction_on_rod, receive_sample
 from seal_friction_ros.core.estimation.pipeline import init
+from seal_friction_ros.core.friction.states import StateFriction
 from seal_friction_ros.core.messages.records import FeedForward, FrictionEstimate
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.export.c_library import sources
@@ -62,6 +65,9 @@ def test_a_simulation_of_the_fmu_is_that_of_python_to_the_bit(exported):
     answers: list[Any] = []
     state = init(PARAMETERS)
     with running(path) as (fmu, variables):
+        if model == 'friction':  # before any input
+            expected = friction_on_rod(PARAMETERS.estimator, RodLoad(0.0, 0.0, 0.0))
+            assert got(fmu, variables, [*expected._fields]) == list(expected)
         for i, sample in enumerate(samples()):
             if model == 'estimator':
                 answers.clear()
@@ -106,6 +112,38 @@ def test_a_refused_step_takes_no_time_and_no_token_makes_no_instance(exported):
         assert function(*[None] * 12) is None
 
 
+def test_garbage_makes_no_garbage_and_a_reset_instance_is_a_new_one(exported):
+    model, path = exported
+    is_estimator = model == 'estimator'
+    outputs = FrictionEstimate._fields[1:] if is_estimator else StateFriction._fields
+    given = [sample if is_estimator else RodLoad(*sample[1:5]) for sample in samples()]
+    numbers, random = (math.nan, math.inf, -math.inf, 5e-324, 1e308, -1e308, -0.0, 3e6), np.random.default_rng(4)
+    garbage = [type(one)(*random.choice(numbers, len(one)).tolist()) for one in given]
+
+    def ran(fmu: Any, variables: dict[str, Any], inputs: list[Any], starts: Sequence[float]) -> Iterator[list[float]]:
+        for at, one in zip(starts, inputs, strict=True):
+            put(fmu, variables, one)
+            with suppress(FMICallException):  # a time that is none
+                fmu.doStep(at, STEP)
+            yield got(fmu, variables, outputs)
+
+    times = [i * STEP for i in range(len(given))]
+    with running(path) as (bad, variables), running(path) as (good, _):
+        pairs = zip(
+            ran(bad, variables, garbage, random.choice([*numbers, 0.1, -0.1], len(given)).tolist()),
+            ran(good, variables, given, times), strict=True,
+        )  # fmt: skip
+        alone = []
+        for of_garbage, of_samples in pairs:
+            assert np.all(np.isfinite(of_garbage))
+            alone.append(of_samples)
+        for reference in (99, variables[outputs[0]].valueReference):  # of nothing, and of an output
+            with pytest.raises(FMICallException):
+                (bad.setReal if isinstance(bad, FMU2Slave) else bad.setFloat64)([reference], [1.0])
+        bad.reset()
+        assert list(ran(bad, variables, given, times)) == alone
+
+
 def test_the_sources_in_the_fmu_build_with_clang_without_a_warning(exported):
     folder = Path(extract(exported[1])) / 'sources'
     clang = [sys.executable, '-m', 'ziglang', 'cc', '-std=c11', '-O0', '-Wall', '-Wextra', '-Werror', '-c']
@@ -148,18 +186,56 @@ int main() {
 """
 
 
-def test_the_controller_of_the_docs_adds_a_force_that_fades_when_upstream_stops(tmp_path: Path):
-    """Against stand-ins of the headers of ros2_control."""
+def built_from_docs(word: str, driver: str, folder: Path, *arguments: str) -> list[float]:
+    """What a driver prints that includes the C++ of docs/controllers.md with a word in it.
+
+    The headers of ros2_control and rclcpp are stand-ins, those of the messages the real ones.
+    """
     page = (ROOT / 'docs' / 'controllers.md').read_text()
-    (source,) = (text for text in re.findall(r'```cpp\n(.*?)```', page, re.DOTALL) if 'seal_friction.h' in text)
-    files = {'controller.cpp': source, 'driver.cpp': DRIVER, **sources(PARAMETERS, '{}', 'seal_friction')}
-    for name, text in files.items():
+    (source,) = (text for text in re.findall(r'```cpp\n(.*?)```', page, re.DOTALL) if word in text)
+    (folder / 'controller.cpp').write_text(source)
+    (folder / 'driver.cpp').write_text(driver)
+    prefixes = [Path(sys.prefix), *map(Path, filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(':')))]
+    messages = [f'-isystem{each}' for prefix in prefixes for each in sorted(prefix.glob('include/*'))]
+    headers = ['-I', str(ROOT / 'test' / 'harness' / 'ros2_control'), *messages]
+    flags = ['-std=c++17', '-O0', '-Wall', '-Wextra', '-Werror']
+    subprocess.run(['c++', *flags, *headers, 'driver.cpp', *arguments, '-o', 'driver'], cwd=folder, check=True)
+    printed = subprocess.run(['./driver'], cwd=folder, check=True, capture_output=True, text=True).stdout
+    return [float(number) for number in printed.split()]
+
+
+def test_the_controller_of_the_docs_adds_a_force_that_fades_when_upstream_stops(tmp_path: Path):
+    for name, text in sources(PARAMETERS, '{}', 'seal_friction').items():
         (tmp_path / name).write_text(text)
     subprocess.run(['cc', '-std=c11', '-O0', '-c', 'seal_friction.c'], cwd=tmp_path, check=True)
-    headers = ROOT / 'test' / 'harness' / 'ros2_control'
-    flags = ['-std=c++17', '-O0', '-Wall', '-Wextra', '-Werror', '-I', str(headers)]
-    subprocess.run(['c++', *flags, 'driver.cpp', 'seal_friction.o', '-o', 'driver'], cwd=tmp_path, check=True)
-    printed = subprocess.run(['./driver'], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
-    before, moving, stopped = map(float, printed.split())
+    before, moving, stopped = built_from_docs('seal_friction.h', DRIVER, tmp_path, 'seal_friction.o')
     assert (before, stopped) == (0.0, 5.0)  # [N]
     assert moving > 6.0
+
+
+SUBSCRIBER = """
+#include "controller.cpp"
+#include <cstdio>
+
+int main() {
+  using Message = seal_friction_msgs::msg::FrictionFeedForward;
+  rclcpp::Node node;
+  FeedForward feedforward(node);
+  auto subscription = std::static_pointer_cast<rclcpp::Subscription<Message>>(node.newest.lock());
+  auto told = [&] (int64_t milliseconds) {
+    node.get_clock()->time = 1700000000000000000 + 1000000 * milliseconds;
+    std::printf("%g\\n", feedforward.force());
+  };
+  told(0);
+  Message message;
+  message.header.stamp.sec = 1700000000;
+  message.force = 7.5;
+  subscription->take(message);
+  for (int64_t age : {0, 49, 51, -49, -51}) told(age);
+  return subscription->topic != "friction_feedforward";
+}
+"""
+
+
+def test_the_subscriber_of_the_docs_gives_the_force_while_it_is_fresh(tmp_path: Path):
+    assert built_from_docs('class FeedForward', SUBSCRIBER, tmp_path) == [0.0, 7.5, 7.5, 0.0, 7.5, 0.0]  # [N]

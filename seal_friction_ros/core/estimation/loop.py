@@ -8,8 +8,10 @@ from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters
 from seal_friction_ros.core.estimation.pipeline import ZERO_CELSIUS, receive
+from seal_friction_ros.core.foundation.limits import between
 from seal_friction_ros.core.friction.actuator import at_temperature, breakaway_in, friction_of_seals
 from seal_friction_ros.core.friction.states import UNKNOWN, StateFriction, sign, state_friction
+from seal_friction_ros.core.friction.temperature import COLDEST, HOTTEST
 from seal_friction_ros.core.messages.records import Force, Pressure, ServoReference, Temperature, Velocity
 
 
@@ -54,19 +56,24 @@ class RodLoad(NamedTuple):
 def friction_on_rod(parameters: EstimatorParameters, load: RodLoad) -> StateFriction:
     """Friction of the seals on a rod by the seal files, without adaptation and elasticity: `states.state_friction`.
 
-    The rod rests at a speed of ``stick_velocity`` and below; a plant that never rests may set that to 0. The state is
-    UNKNOWN and the force 0 N where a number is not finite.
+    The rod rests at a speed of ``stick_velocity`` and below; a plant that never rests may set that to 0. Velocity and
+    pressures count up to ``velocity_max``, ``pressure_min`` and ``pressure_max``; a temperature that no rubber seal has
+    is not known. The state is UNKNOWN and the force 0 N where another number is not finite.
     """
     if not math.isfinite(load.velocity + load.pressure_a + load.pressure_b + load.force_sum):
         return StateFriction(UNKNOWN, 0, 0.0)
-    at_rest = abs(load.velocity) <= parameters.settings.stick_velocity
-    velocity = 0.0 if at_rest else load.velocity
-    friction = friction_of_seals(parameters.seal_numbers, load.pressure_a, load.pressure_b, velocity)
+    settings = parameters.settings
+    at_rest = abs(load.velocity) <= settings.stick_velocity
+    velocity = 0.0 if at_rest else between(-settings.velocity_max, load.velocity, settings.velocity_max)
+    pressure_a = between(settings.pressure_min, load.pressure_a, settings.pressure_max)
+    pressure_b = between(settings.pressure_min, load.pressure_b, settings.pressure_max)
+    friction = friction_of_seals(parameters.seal_numbers, pressure_a, pressure_b, velocity)
     if parameters.has_temperature_scale:
-        known = not math.isnan(load.temperature)
-        kelvin = load.temperature + ZERO_CELSIUS if known else parameters.temperature_scale.reference
+        kelvin = load.temperature + ZERO_CELSIUS
+        if not COLDEST <= kelvin <= HOTTEST:
+            kelvin = parameters.temperature_scale.reference
         friction = at_temperature(friction, parameters.temperature_scale, kelvin)
     ahead = sign(load.force_sum if at_rest else velocity)
-    breakaway = breakaway_in(friction, ahead, with_stiction=parameters.settings.use_stiction)
+    breakaway = breakaway_in(friction, ahead, with_stiction=settings.use_stiction)
     sliding = friction.coulomb_friction + friction.velocity_friction
     return state_friction(velocity, load.force_sum, at_rest, sliding, breakaway)

@@ -1,14 +1,14 @@
 """``seal_friction export c``: the estimator as C, with one header, for a control loop without Python.
 
-The folder has the sources, ``configuration.json`` (seal files and settings), a Makefile, two examples and their
-samples. Messages and state are structs of the records of Python.
+The folder has the sources, ``configuration.json`` (seal files and settings), a Makefile, an example in C and C++,
+and its samples. Messages and state are structs of the records of Python.
 """
 
 import hashlib
 import re
 import shutil
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import make_dataclass
 from pathlib import Path
 from string import Template
@@ -99,12 +99,8 @@ def digest(document: str) -> str:
 
 def example_samples() -> str:
     """CSV of a second at 1 kHz, in which the rod goes to and fro once."""
-    rows = [
-        f'{i}000000,{speed!r},3e6,1e6,{800.0 * speed!r},{speed!r},0.0,'
-        for i in range(1000)
-        for speed in [0.05 if i < 500 else -0.05]
-    ]
-    return '\n'.join([','.join(LoopSample._fields), *rows, ''])
+    speeds = [0.05] * 500 + [-0.05] * 500  # [m/s]
+    return _csv(f'{i}000000,{v},3e6,1e6,{800.0 * v},{v},0.0,' for i, v in enumerate(speeds))
 
 
 def samples_of(bag: Path) -> str:
@@ -112,8 +108,11 @@ def samples_of(bag: Path) -> str:
     run = read_run(bag)
     columns = run.time, run.velocity, run.pressure_a, run.pressure_b, run.force_sum
     rows = zip(*(column.tolist() for column in columns), strict=True)
-    lines = [f'{round(time * 1e9)},{",".join(map(repr, values))},,,' for time, *values in rows]
-    return '\n'.join([','.join(LoopSample._fields), *lines, ''])
+    return _csv(f'{round(time * 1e9)},{",".join(map(repr, values))},,,' for time, *values in rows)
+
+
+def _csv(rows: Iterable[str]) -> str:
+    return '\n'.join([','.join(LoopSample._fields), *rows, ''])
 
 
 def sources(parameters: pipeline.PipelineParameters, document: str, name: str) -> dict[str, str]:
@@ -123,13 +122,11 @@ def sources(parameters: pipeline.PipelineParameters, document: str, name: str) -
     try:
         values = {
             'name': name, 'NAME': name.upper(), 'mark': mark('export'), 'hash': digest(document),
-            'version': f'{package_version()}, algorithm {ALGORITHM_VERSION}', **_parts(parameters, name),
+            'version': f'{package_version()}, algorithm {ALGORITHM_VERSION}', **_parts(parameters, document, name),
         }  # fmt: skip
     except UntranslatableError as error:
         raise ValueError(f'no C for this configuration: {error}') from None
-    files = {f'{name}.h': 'library.h', f'{name}.c': 'library.c'} | {
-        x: x for x in ('Makefile', 'example.c', 'example.cpp')
-    }
+    files = {f'{name}.h': 'library.h', f'{name}.c': 'library.c', 'Makefile': 'Makefile', 'example.c': 'example.c'}
     made = {file: filled(template, values) for file, template in files.items()}
     return made | {'configuration.json': document}
 
@@ -139,7 +136,7 @@ def filled(template: str, values: dict[str, str]) -> str:
     return Template((TEMPLATES / template).read_text(encoding='utf-8')).substitute(values)
 
 
-def _parts(parameters: pipeline.PipelineParameters, name: str) -> dict[str, str]:
+def _parts(parameters: pipeline.PipelineParameters, document: str, name: str) -> dict[str, str]:
     """What the templates leave open: structs and functions."""
     types = Types(name)
     for kind in (pipeline.PipelineState, LoopSample, ANSWERS, RodLoad, StateFriction, *MESSAGES):
@@ -155,15 +152,17 @@ def _parts(parameters: pipeline.PipelineParameters, name: str) -> dict[str, str]
         receive, _ = translation.function(pipeline.receive, [known, state, Runtime('', kind), time, answers, time])
         given = f'{name}_pipeline_state *state, {types.name(kind)} message'
         times = f'int64_t received, int64_t sent, {name}_answers *answers'
-        heads.append(f'bool {name}_receive_{snake(kind.__name__)}({given}, {times})')
-        bodies.append(f'{{\n    RECEIVE({receive})\n}}\n')
+        head = f'bool {name}_receive_{snake(kind.__name__)}({given}, {times})'
+        heads.append(f'{head};')
+        bodies.append(f'{head}\n{{\n    RECEIVE({receive})\n}}\n')
     places = list(_places(pipeline.PipelineState, 'state->'))
     return {
         'structs': structs,
         'enums': '\n'.join(_enum(kind, name) for kind in (Status, FrictionState, Limited)),
         'state_size': str(len(places)),
-        'receivers': '\n'.join(f'{head};' for head in heads),
-        'bodies': '\n'.join(f'{head}\n{body}' for head, body in zip(heads, bodies, strict=True)),
+        'layout': digest(f'{document} {places}')[:16],
+        'receivers': '\n'.join(heads),
+        'bodies': '\n'.join(bodies),
         'types': '\n'.join(types.declarations),
         'functions': translation.text,
         'first': initialiser(pipeline.init(parameters)),

@@ -12,7 +12,6 @@ The C computes what Python computes, operation by operation: IEEE double precisi
 import ast
 import inspect
 import math
-import re
 import textwrap
 from bisect import bisect_right
 from collections import Counter
@@ -41,28 +40,6 @@ from seal_friction_ros.offline.export.c_types import (
     unified,
 )
 
-PRELUDE = {
-    'add': 'int64_t add(int64_t a, int64_t b) { return (int64_t)((uint64_t)a + (uint64_t)b); }',
-    'subtract': 'int64_t subtract(int64_t a, int64_t b) { return (int64_t)((uint64_t)a - (uint64_t)b); }',
-    'multiply': 'int64_t multiply(int64_t a, int64_t b) { return (int64_t)((uint64_t)a * (uint64_t)b); }',
-    'absolute': 'int64_t absolute(int64_t a) { return a < 0 ? (int64_t)(0 - (uint64_t)a) : a; }',
-    'smaller': 'double smaller(double a, double b) { return b < a ? b : a; }',
-    'larger': 'double larger(double a, double b) { return b > a ? b : a; }',
-    'smaller_integer': 'int64_t smaller_integer(int64_t a, int64_t b) { return b < a ? b : a; }',
-    'larger_integer': 'int64_t larger_integer(int64_t a, int64_t b) { return b > a ? b : a; }',
-    # volatile: a compiler turns a power of 2 that it knows into a product, which rounds differently
-    'power': 'double power(double a, double b) { volatile double exponent = b; return pow(a, exponent); }',
-    'last_place': """int64_t last_place(const double *knots, int64_t n, double x) {
-    int64_t low = 0, high = n;
-    while (low < high) {
-        int64_t middle = (low + high) / 2;
-        if (x < knots[middle]) high = middle; else low = middle + 1;
-    }
-    return low;
-}""",
-}
-"""Functions that the translated ones call: whole numbers wrap around; of two numbers Python chooses like this."""
-
 _WHOLE = {ast.Add: 'add', ast.Sub: 'subtract', ast.Mult: 'multiply'}
 _BITS = {ast.BitAnd: '&', ast.BitOr: '|', ast.BitXor: '^'}
 _REAL = {ast.Add: '+', ast.Sub: '-', ast.Mult: '*', ast.Div: '/'}
@@ -76,7 +53,8 @@ _TESTS = {math.isnan: 'isnan', math.isinf: 'isinf', math.isfinite: 'isfinite'}
 _RESERVED = {
     'auto', 'break', 'case', 'char', 'const', 'default', 'do', 'double', 'enum', 'extern', 'float', 'goto', 'inline',
     'int', 'long', 'register', 'restrict', 'short', 'signed', 'sizeof', 'static', 'struct', 'switch', 'typedef',
-    'union', 'unsigned', 'void', 'volatile', 'bool', 'true', 'false', *_OF_MATH.values(), *_TESTS.values(), *PRELUDE,
+    'union', 'unsigned', 'void', 'volatile', 'bool', 'true', 'false', *_OF_MATH.values(), *_TESTS.values(),
+    *_WHOLE.values(), 'absolute', 'smaller', 'larger', 'smaller_integer', 'larger_integer', 'last_place',
 }  # fmt: skip
 
 
@@ -93,10 +71,8 @@ class Translation:
     @property
     def text(self) -> str:
         """Everything, in the order that C wants."""
-        functions = '\n'.join(self._functions.values())
         constants = [f'static const {text.replace("@", name)};' for text, name in self._constants.items()]
-        helpers = [f'static inline {text}' for name, text in PRELUDE.items() if re.search(rf'\b{name}\(', functions)]
-        return '\n'.join([*helpers, '', *constants, '', functions])
+        return '\n'.join([*constants, '', *self._functions.values()])
 
     def constant(self, value: Any) -> str:
         """Name of a constant of a record, or of a table of numbers."""
@@ -112,11 +88,8 @@ class Translation:
             self._kept += [a.value for a in arguments if isinstance(a, Static)]
             body = _Body(self, function, arguments)
             module = function.__module__.rpartition('.')[2].capitalize()  # no --name begins with a capital
-            name = stem = f'{module}_{function.__name__.strip("_")}'
-            lines, alike = body.lines(), 1
-            while name in self._functions:
-                alike += 1
-                name = f'{stem}_v{alike}'
+            name, lines = f'{module}_{function.__name__.strip("_")}', body.lines()
+            name += f'_V{len(self._functions)}' if name in self._functions else ''  # no function has a capital
             self._functions[name] = '\n'.join([f'/* {first_line(function)} */', body.head(name), '{', *lines, '}', ''])
             self._known[key] = name, body.returned
         return self._known[key]
@@ -132,7 +105,6 @@ class _Body:
         self._stores = Counter([*self._given, *stored])
         self._kinds = {name: each.kind for name, each in self._given.items() if isinstance(each, Runtime)}
         self._arguments = tuple(self._kinds)
-        self._unread: set[str] = set()  # known after the first pass
         self.returned: Any = None
 
     def head(self, name: str) -> str:
@@ -141,24 +113,14 @@ class _Body:
         return f'static {self._all.types.name(self.returned)} {name}({given or "void"})'
 
     def lines(self) -> list[str]:
-        """Its lines. Passes repeat until the kind of each variable is known, and which ones are read."""
-        lines, before = self._passed(), None
-        while before != (self._kinds, self.returned, self._unread):
-            before = dict(self._kinds), self.returned, self._unread
-            self._unread = {each for each in self._stores if _c_name(each) not in _names_read(lines)}
+        """Its lines: variables first. Passes repeat until the kind of each variable is known."""
+        before = None
+        while before != (self._kinds, self.returned):
+            before = dict(self._kinds), self.returned
             lines = self._passed()
-        top = [self._unused(name) for name in self._arguments]
-        for name in [each for each in self._kinds if each not in self._arguments]:
-            at = next(i for i, line in enumerate(lines) if _c_name(name) in _NAME.findall(line))
-            value = lines[at].removeprefix(f'    {_c_name(name)} = ')
-            if value == lines[at]:  # set within a block
-                value, at = f'{_zero(self._kinds[name])};', 0
-                lines.insert(at, '')
-            lines[at] = f'    {self._declared(name)} = {value}{self._unused(name)}'
-        return [*filter(None, top), *lines]
-
-    def _unused(self, name: str) -> str:
-        return f' (void){_c_name(name)};' if name in self._unread else ''
+        variables = [name for name in self._kinds if name not in self._arguments]
+        declared = [f'    {self._declared(name)} = {_zero(self._kinds[name])};' for name in variables]
+        return [*declared, *lines]
 
     def _passed(self) -> list[str]:
         self._lines, self._depth, self._temporaries = list[str](), 1, 0
@@ -203,14 +165,15 @@ class _Body:
             return True
         made = self._runtime(value)
         self.returned = made.kind if self.returned is None else unified(self.returned, made.kind)
-        self._emit(f'return {_bare(self._as(made, self.returned))};')
+        self._emit(f'return {self._as(made, self.returned)};')
         return True
 
     def _do_if(self, node: ast.If) -> bool:
         condition = self._test(node.test)
         if isinstance(condition, Static):
             return self._block(node.body if condition.value else node.orelse)
-        self._emit(f'if ({_bare(condition.code)}) {{')
+        is_bracketed = condition.code[0] + condition.code[-1] == '()'
+        self._emit(f'if {condition.code} {{' if is_bracketed else f'if ({condition.code}) {{')
         ends = self._indented(node.body)
         if node.orelse:
             self._emit('} else {')
@@ -231,8 +194,8 @@ class _Body:
     def _do_for(self, node: ast.For) -> None:
         """Its body for each seal, or each number: a break leaves the block of all of them."""
         over = self._value(node.iter)
-        if not isinstance(over, Static):
-            raise UntranslatableError('a loop over what is not known')
+        if not isinstance(over, Static) or node.orelse:
+            raise UntranslatableError('a loop over what is not known, or with "else"')
         self._emit('do {')
         for each in over.value:
             self._static[cast(ast.Name, node.target).id] = each
@@ -242,14 +205,22 @@ class _Body:
     def _do_assign(self, node: ast.Assign) -> None:
         first, *others = node.targets
         if isinstance(first, ast.Tuple):
-            is_tuple = isinstance(node.value, ast.Tuple)
-            elements = cast(ast.Tuple, node.value).elts if is_tuple else []
+            elements = node.value.elts if isinstance(node.value, ast.Tuple) else []
             values = [self._value(each) for each in elements] or self._members(self._value(node.value))
-            self._set_together(first.elts, values)
+            copies = [self._temporary(each) if isinstance(each, Runtime) else each for each in values]
+            for target, copy in zip(first.elts, copies, strict=True):  # no target changes what another one is set to
+                if ast.unparse(target) != '_':
+                    self._set(target, copy)
         else:
             self._set(first, self._value(node.value))
         for other in others:
             self._set(other, self._value(_as_read(first)))
+
+    def _do_augassign(self, node: ast.AugAssign) -> None:
+        self._set(node.target, self._value(ast.BinOp(_as_read(node.target), node.op, node.value)))
+
+    def _do_annassign(self, node: ast.AnnAssign) -> None:
+        self._set(node.target, self._value(cast(ast.expr, node.value)))
 
     def _members(self, value: Value) -> list[Value]:
         """Members of a record or tuple, which is computed once."""
@@ -258,20 +229,6 @@ class _Body:
         held = self._temporary(value) if '(' in value.code else value
         return [self._attribute(held, name) for name in field_names(held.kind) or fields_of(held.kind)]
 
-    def _set_together(self, targets: Sequence[ast.expr], values: Sequence[Value]) -> None:
-        """All at once: no target changes what another one is set to."""
-        pairs = [(t, v) for t, v in zip(targets, values, strict=True) if not self._is_dropped(t, v)]
-        if any(
-            _mentions(v, ast.unparse(t).replace('.', '->')) for i, (t, _) in enumerate(pairs) for _, v in pairs[i + 1 :]
-        ):
-            pairs = [(t, self._temporary(v) if isinstance(v, Runtime) else v) for t, v in pairs]
-        for target, value in pairs:
-            self._set(target, value)
-
-    def _is_dropped(self, target: ast.expr, value: Value) -> bool:
-        is_pure = isinstance(value, Runtime) and '(' not in value.code
-        return isinstance(target, ast.Name) and (target.id == '_' or (is_pure and target.id in self._unread))
-
     def _set(self, target: ast.expr, value: Value) -> None:
         if isinstance(target, ast.Name):
             self._set_name(target.id, value)
@@ -279,21 +236,23 @@ class _Body:
         place = self._value(_as_read(target))
         if not isinstance(place, Runtime):
             raise UntranslatableError('an assignment to a parameter')
-        self._emit(f'{place.code} = {_bare(self._as(self._runtime(value), place.kind))};')
+        self._emit(f'{place.code} = {self._as(self._runtime(value), place.kind)};')
 
     def _set_name(self, name: str, value: Value) -> None:
         if isinstance(value, Static) and (self._stores[name] < 2 or kind_of(value.value) is None):
+            if self._stores[name] > 1 and self._static.setdefault(name, value.value) is not value.value:
+                raise UntranslatableError(f'{name} is one or the other, and no number')
             self._static[name] = value.value
             return
         self._static.pop(name, None)
         made = self._runtime(value)
         self._kinds[name] = unified(self._kinds.get(name, made.kind), made.kind)
-        self._emit(f'{_c_name(name)} = {_bare(self._as(made, self._kinds[name]))};')
+        self._emit(f'{_c_name(name)} = {self._as(made, self._kinds[name])};')
 
     def _temporary(self, value: Runtime) -> Runtime:
         self._temporaries += 1
         name, star = f'held_{self._temporaries}', '*' if is_mutable(value.kind) else ''
-        self._emit(f'{self._all.types.name(value.kind)} {star}{name} = {_bare(value.code)};')
+        self._emit(f'{self._all.types.name(value.kind)} {star}{name} = {value.code};')
         return Runtime(name, value.kind)
 
     # -- expressions --------------------------------------------------------------------------------------------------
@@ -327,7 +286,7 @@ class _Body:
 
     def _made(self, kind: Any, members: Sequence[Value]) -> str:
         fields = fields_of(kind)
-        parts = [f'.{n} = {_bare(self._as(self._runtime(v), fields[n]))}' for n, v in zip(fields, members, strict=True)]
+        parts = [f'.{n} = {self._as(self._runtime(v), fields[n])}' for n, v in zip(fields, members, strict=True)]
         return f'({self._all.types.name(kind)}){{{", ".join(parts)}}}'
 
     def _of_name(self, node: ast.Name) -> Value:
@@ -352,7 +311,7 @@ class _Body:
                 return Static(record.value[index.value])
             return self._members(record)[cast(int, index.value)]
         if isinstance(record, Static):
-            return Runtime(f'{self._all.constant(record.value)}[{_bare(index.code)}]', float)
+            return Runtime(f'{self._all.constant(record.value)}[{index.code}]', float)
         raise UntranslatableError('a place in a record that is not known')
 
     def _of_tuple(self, node: ast.Tuple) -> Value:
@@ -377,7 +336,7 @@ class _Body:
             return Runtime(f'({_real(a)} {_REAL[kind]} {_real(b)})', float)
         if kind in _BITS:
             return Runtime(f'({a.code} {_BITS[kind]} {b.code})', int)
-        return Runtime(f'{_WHOLE[kind]}({_bare(a.code)}, {_bare(b.code)})', int)
+        return Runtime(f'{_WHOLE[kind]}({a.code}, {b.code})', int)
 
     def _of_compare(self, node: ast.Compare) -> Value:
         values = [self._value(each) for each in (node.left, *node.comparators)]
@@ -393,11 +352,15 @@ class _Body:
         return Runtime(f'({self._runtime(a).code} {_COMPARED[type(kind)]} {self._runtime(b).code})', bool)
 
     def _of_boolop(self, node: ast.BoolOp) -> Value:
-        is_or = isinstance(node.op, ast.Or)
-        return _joined([self._test(each) for each in node.values], '||' if is_or else '&&', decisive=is_or)
+        if any(isinstance(each, Runtime) and each.kind is not bool for each in map(self._value, node.values)):
+            raise UntranslatableError('"and" or "or" for a number')
+        return self._test(node)
 
     def _test(self, node: ast.expr) -> Value:
         """Truth of a value."""
+        if isinstance(node, ast.BoolOp):
+            is_or = isinstance(node.op, ast.Or)
+            return _joined([self._test(each) for each in node.values], '||' if is_or else '&&', decisive=is_or)
         value = self._value(node)
         if isinstance(value, Static):
             return Static(bool(value.value))
@@ -437,9 +400,9 @@ class _Body:
             return Static(cast(Runtime, values[0]).kind)
         if not (inspect.isfunction(function) or is_kind(function)) or function in SCALARS:
             return self._of_builtin(function, [self._runtime(value) for value in values])
-        parameters = inspect.signature(function).parameters
-        given = inspect.signature(function).bind(*values, **named).arguments
-        arguments = {name: given.get(name, Static(each.default)) for name, each in parameters.items()}
+        signature = inspect.signature(function)
+        arguments: dict[str, Value] = {name: Static(each.default) for name, each in signature.parameters.items()}
+        arguments |= signature.bind(*values, **named).arguments
         if is_kind(function):
             return Runtime(self._made(function, [arguments[name] for name in fields_of(function)]), function)
         return self._of_function(function, arguments)
@@ -452,13 +415,13 @@ class _Body:
             is_float = isinstance(made, Runtime) and _hints_of(function).get(name) is float
             arguments[name] = Runtime(cast(Runtime, made).code, float) if is_float else made
         name, kind = self._all.function(function, list(arguments.values()))
-        codes = [_bare(each.code) for each in arguments.values() if isinstance(each, Runtime)]
+        codes = [each.code for each in arguments.values() if isinstance(each, Runtime)]
         return Runtime(f'{name}({", ".join(codes)})', kind)
 
     def _replaced(self, record: Runtime, changes: Mapping[str, Value]) -> Value:
         held, fields = self._temporary(record), fields_of(record.kind)
         for name, value in changes.items():
-            self._emit(f'{held.code}.{name} = {_bare(self._as(self._runtime(value), fields[name]))};')
+            self._emit(f'{held.code}.{name} = {self._as(self._runtime(value), fields[name])};')
         return held
 
     def _sent(self, answers: Runtime, record: Runtime) -> Value:
@@ -468,9 +431,9 @@ class _Body:
         return Static(None)
 
     def _of_builtin(self, function: Any, each: Sequence[Runtime]) -> Value:
-        codes, kind = ', '.join(_bare(one.code) for one in each), unified(each[0].kind, each[-1].kind)
+        codes, kind = ', '.join(one.code for one in each), unified(each[0].kind, each[-1].kind)
         if function in _TESTS:
-            return Runtime(f'(bool){_TESTS[function]}({codes})', bool)
+            return Runtime(f'({_TESTS[function]}({codes}) != 0)', bool)
         if function in _OF_MATH:
             return Runtime(f'{_OF_MATH[function]}({codes})', float)
         if function in (float, int):
@@ -483,45 +446,12 @@ class _Body:
         raise UntranslatableError(f'no C for {function!r}')
 
 
-_NAME = re.compile(r'(?<![.>\w])[a-zA-Z_]\w*')  # in C, of no member
-
-# -- syntax -----------------------------------------------------------------------------------------------------------
-
-
-class _Plain(ast.NodeTransformer):
-    """Statements in their plain form: ``a += b`` as an assignment, a choice of tuples as a branch."""
-
-    def visit_AugAssign(self, node: ast.AugAssign) -> ast.stmt:
-        """``a += b`` is ``a = a + b``."""
-        return ast.Assign([node.target], ast.BinOp(_as_read(node.target), node.op, node.value))
-
-    def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.stmt:
-        """The type is told by the value."""
-        return ast.Assign([node.target], cast(ast.expr, node.value))
-
-    def visit_Assign(self, node: ast.Assign) -> ast.stmt:
-        """A choice of tuples is a branch with an assignment each."""
-        if isinstance(node.value, ast.IfExp) and isinstance(node.targets[0], ast.Tuple):
-            body, otherwise = (ast.Assign(node.targets, each) for each in (node.value.body, node.value.orelse))
-            return ast.If(node.value.test, [body], [otherwise])
-        return node
-
-    def visit_Return(self, node: ast.Return) -> ast.stmt:
-        """A choice of tuples is a branch with a return each."""
-        if isinstance(node.value, ast.IfExp) and isinstance(node.value.body, ast.Tuple):
-            return ast.If(node.value.test, [ast.Return(node.value.body)], [ast.Return(node.value.orelse)])
-        return node
-
-
 @cache
 def _tree_of(function: Any) -> ast.FunctionDef:
-    tree = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
-    return cast(ast.FunctionDef, _Plain().visit(tree))
+    return cast(ast.FunctionDef, ast.parse(textwrap.dedent(inspect.getsource(function))).body[0])
 
 
-@cache
-def _hints_of(function: Any) -> dict[str, Any]:
-    return get_type_hints(function)
+_hints_of = cache(get_type_hints)
 
 
 @cache
@@ -538,18 +468,8 @@ def _as_read(node: ast.expr) -> ast.expr:
     return ast.parse(ast.unparse(node), mode='eval').body
 
 
-def _names_read(lines: Sequence[str]) -> set[str]:
-    """Names in statements of C but for those that these set."""
-    read = re.sub(r'^ *([a-z]\w* \*?)?\w+ = ', '', '\n'.join(lines), flags=re.MULTILINE)
-    return set(_NAME.findall(read))
-
-
 def _c_name(name: str) -> str:
     return f'{name}_' if name in _RESERVED else name
-
-
-def _mentions(value: Value, place: str) -> bool:
-    return isinstance(value, Runtime) and re.search(rf'(?<![\w.>]){re.escape(place)}\b', value.code) is not None
 
 
 def _zero(kind: Any) -> str:
@@ -572,12 +492,3 @@ def _joined(links: Sequence[Value], sign: str, *, decisive: bool) -> Value:
     if not codes:
         return Static(not decisive)
     return Runtime(codes[0] if len(codes) == 1 else f'({f" {sign} ".join(codes)})', bool)
-
-
-def _bare(code: str) -> str:
-    """Code without the brackets around all of it."""
-    depth, ends = 0, []
-    for i, character in enumerate(code):
-        depth += {'(': 1, ')': -1}.get(character, 0)
-        ends += [i] if depth == 0 else []
-    return code[1:-1] if code.startswith('(') and ends[0] == len(code) - 1 else code

@@ -1,7 +1,6 @@
 """Types and values of Python in C: records become structs, whole numbers ``int64_t``, constants initialisers."""
 
 import inspect
-import math
 import re
 from functools import cache
 from typing import Any, NamedTuple, get_type_hints
@@ -50,7 +49,7 @@ def meanings_of(kind: Any) -> dict[str, str]:
     """Comment of each field in the source of a record."""
     try:
         source = inspect.getsource(kind)
-    except (OSError, TypeError):  # a record that no source declares
+    except (OSError, TypeError):  # a tuple, or a record that no source declares
         return {}
     found = re.findall(r'^    (\w+): .*?  # (.*)$', source, re.MULTILINE)
     return {name: _comment(text) for name, text in found}
@@ -78,8 +77,6 @@ def unified(first: Any, second: Any) -> Any:
     """Kind that holds the values of both."""
     if first == second:
         return first
-    if isinstance(first, tuple) and isinstance(second, tuple) and len(first) == len(second):
-        return tuple(map(unified, first, second))
     numbers = [bool, int, float]
     if first in numbers and second in numbers:
         return numbers[max(numbers.index(first), numbers.index(second))]
@@ -90,14 +87,10 @@ def number(value: Any) -> str:
     """Literal of C for a number, to the last bit."""
     if isinstance(value, bool):
         return 'true' if value else 'false'
-    if isinstance(value, int):
-        if value == -(2**63):
-            return 'INT64_MIN'
-        text = str(value) if abs(value) < 2**31 else f'INT64_C({abs(value)})'.replace('(', '(-' if value < 0 else '(')
-        return f'({text})' if text.startswith('-') else text
-    if math.isfinite(value):
-        return repr(value) if math.copysign(1.0, value) > 0.0 else f'({value!r})'
-    return 'NAN' if math.isnan(value) else 'INFINITY' if value > 0.0 else '(-INFINITY)'
+    text = str(value).replace('inf', 'INFINITY').replace('nan', 'NAN')
+    if isinstance(value, int) and abs(value) >= 2**31:
+        text = 'INT64_MIN' if value == -(2**63) else f'{text}LL'
+    return f'({text})' if text[0] == '-' else text
 
 
 def initialiser(value: Any) -> str:
@@ -133,7 +126,7 @@ class Types:
         return self._names[kind]
 
     def _member(self, kind: Any, name: str, each: Any) -> str:
-        meaning = '' if isinstance(kind, tuple) else meanings_of(kind).get(name, '')
+        meaning = meanings_of(kind).get(name)
         return f'    {self.name(each)} {name};' + (f' /* {meaning} */' if meaning else '')
 
     def _new_name(self, kind: Any) -> str:

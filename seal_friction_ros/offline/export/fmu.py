@@ -6,7 +6,6 @@
 The binary is for this machine; the sources in the FMU are for other Linux machines.
 """
 
-import math
 import platform
 import shutil
 import tempfile
@@ -26,31 +25,35 @@ PLATFORMS = {('2', 'x86_64'): 'linux64', ('3', 'x86_64'): 'x86_64-linux', ('3', 
 """FMI version and machine -> folder of the binary; no binary for others."""
 
 
+TAGS = {'2': {float: 'Real', int: 'Integer'}, '3': {float: 'Float64', int: 'Int64'}}
+"""FMI version -> its name of the kind of a variable."""
+
+
 class Variable(NamedTuple):
     """One variable of the FMU."""
 
     name: str
     place: str  # in C, of the instance
     kind: Any  # float or int
-    is_input: bool
-    start: float
-    meaning: str
+    causality: str  # input, output, or independent: time
+    start: float = 0.0
+    meaning: str = ''
 
 
 def variables(model: str) -> list[Variable]:
-    """Inputs and outputs of a model; a value reference is a place in this list, after that of time, 0."""
+    """Time, inputs and outputs of a model; a value reference is a place in this list."""
+    time = Variable('time', 'time', float, 'independent', meaning='[s]')
     if model == 'friction':
-        return [*_members(RodLoad, 'load', is_input=True), *_members(StateFriction, 'friction')]
-    made = [*_members(LoopSample, 'sample', is_input=True), *_members(FrictionEstimate, 'answers.friction_estimate')]
-    return made + [
-        one._replace(name=f'feedforward_{one.name}') for one in _members(FeedForward, 'answers.feed_forward')
-    ]
+        return [time, *_members(RodLoad, 'load', 'input'), *_members(StateFriction, 'friction', 'output')]
+    made = _members(FrictionEstimate, 'answers.friction_estimate', 'output')
+    force = _members(FeedForward, 'answers.feed_forward', 'output', 'feedforward_')
+    return [time, *_members(LoopSample, 'sample', 'input'), *made, *force]
 
 
-def _members(kind: Any, place: str, *, is_input: bool = False) -> list[Variable]:
-    starts, meanings = getattr(kind, '_field_defaults', {}) if is_input else {}, meanings_of(kind)
+def _members(kind: Any, place: str, causality: str, prefix: str = '') -> list[Variable]:
+    starts, meanings = kind._field_defaults, meanings_of(kind)
     return [
-        Variable(name, f'{place}.{name}', each, is_input, starts.get(name, 0.0), meanings.get(name, ''))
+        Variable(prefix + name, f'{place}.{name}', each, causality, starts.get(name, 0.0), meanings.get(name, ''))
         for name, each in fields_of(kind).items()
         if name != 'stamp'
     ]
@@ -99,20 +102,22 @@ def export_fmu(configuration: Configuration, fmu: Path, model: str = 'estimator'
 
 
 def _source(model: str, fmi: str, name: str) -> str:
-    places = {float: '', int: ''}
-    for reference, each in enumerate(variables(model), start=1):
+    places, inputs = {float: '', int: ''}, [each for each in variables(model) if each.causality == 'input']
+    for reference, each in enumerate(variables(model)):
         places[each.kind] += f'    case {reference}: return &self->{each.place};\n'
-    inputs = sum(each.is_input for each in variables(model))
-    values = {'reals': places[float], 'integers': places[int], 'inputs': str(inputs), 'name': name, 'fmi': fmi}
-    starts = ' '.join(f'self->{each.place} = {number(each.start)};' for each in variables(model)[:inputs])
-    return filled('fmu.c', {**values, 'starts': starts, 'is_estimator': str(int(model == 'estimator'))})
+    return filled('fmu.c', {
+        'name': name, 'fmi': fmi, 'is_estimator': str(int(model == 'estimator')), 'inputs': str(len(inputs)),
+        'real': TAGS[fmi][float], 'integer': TAGS[fmi][int], 'reals': places[float], 'integers': places[int],
+        'starts': ' '.join(f'self->{each.place} = {number(each.start)};' for each in inputs),
+        'flag': 'int' if fmi == '2' else 'bool', 'integer_type': 'int' if fmi == '2' else 'int64_t',
+    })  # fmt: skip
 
 
 def _built(files: dict[str, str]) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         for name, text in files.items():
             (Path(folder) / name).write_text(text, encoding='utf-8')
-        flags = '-std=c11 -O2 -ffp-contract=off -fPIC -shared -Wl,-Bsymbolic'
+        flags = '-std=c11 -O2 -fPIC -shared -Wl,-Bsymbolic'
         command = ['cc', *flags.split(), '-o', 'fmu.so', *(name for name in files if name.endswith('.c')), '-lm']
         build(command, Path(folder))
         return (Path(folder) / 'fmu.so').read_bytes()
@@ -131,15 +136,13 @@ _BUILD = """<?xml version="1.0" encoding="UTF-8"?>
 
 def _description(model: str, fmi: str, name: str, token: str) -> str:
     files = f'<SourceFiles><File name="fmu.c"/><File name="{name}.c"/></SourceFiles>' if fmi == '2' else ''
-    kinds = ['CoSimulation'] if model == 'estimator' else ['ModelExchange', 'CoSimulation']
-    variable = ' canHandleVariableCommunicationStepSize="true"'
-    interfaces = [
-        f'<{kind} modelIdentifier="{name}"{variable if kind == "CoSimulation" else ""}>{files}</{kind}>'
-        for kind in kinds
-    ]
+    steps = (
+        f'<CoSimulation modelIdentifier="{name}" canHandleVariableCommunicationStepSize="true">{files}</CoSimulation>'
+    )
+    exchange = f'<ModelExchange modelIdentifier="{name}">{files}</ModelExchange>'
     head = {'2': f'guid="{token}" numberOfEventIndicators="0"', '3': f'instantiationToken="{token}"'}[fmi]
     known = variables(model)
-    outputs = [i for i, each in enumerate(known, start=1) if not each.is_input]
+    outputs = [i for i, each in enumerate(known) if each.causality == 'output']
     if fmi == '2':
         unknowns = ''.join(f'<Unknown index="{i + 1}"/>' for i in outputs)
         lists = [f'<{group}>{unknowns}</{group}>' for group in ('Outputs', 'InitialUnknowns')]
@@ -148,21 +151,15 @@ def _description(model: str, fmi: str, name: str, token: str) -> str:
     return '\n'.join([
         '<?xml version="1.0" encoding="UTF-8"?>',
         f'<fmiModelDescription fmiVersion="{fmi}.0" modelName="{name}" {head} generationTool="seal_friction export">',
-        *interfaces, '<ModelVariables>', *(_variable(fmi, i, each) for i, each in enumerate([_TIME, *known])),
-        '</ModelVariables>', '<ModelStructure>', *lists, '</ModelStructure>', '</fmiModelDescription>', '',
+        *([exchange] if model == 'friction' else []), steps,
+        '<ModelVariables>', *(_variable(fmi, i, each) for i, each in enumerate(known)), '</ModelVariables>',
+        '<ModelStructure>', *lists, '</ModelStructure>', '</fmiModelDescription>', '',
     ])  # fmt: skip
 
 
-_TIME = Variable('time', '', float, False, 0.0, '[s]')
-
-
-_TAGS = {('2', float): 'Real', ('2', int): 'Integer', ('3', float): 'Float64', ('3', int): 'Int64'}
-
-
 def _variable(fmi: str, reference: int, each: Variable) -> str:
-    causality = 'independent' if each is _TIME else 'input' if each.is_input else 'output'
-    variability, tag = 'continuous' if each.kind is float else 'discrete', _TAGS[fmi, each.kind]
-    start = f' start="{"NaN" if math.isnan(each.start) else each.start}"' if each.is_input else ''
-    given = f'name="{each.name}" valueReference="{reference}" causality="{causality}" variability="{variability}"'
+    variability, tag = 'continuous' if each.kind is float else 'discrete', TAGS[fmi][each.kind]
+    start = f' start="{str(each.start).replace("nan", "NaN")}"' if each.causality == 'input' else ''
+    given = f'name="{each.name}" valueReference="{reference}" causality="{each.causality}" variability="{variability}"'
     given += f' description={quoteattr(each.meaning)}' if each.meaning else ''
     return f'<ScalarVariable {given}><{tag}{start}/></ScalarVariable>' if fmi == '2' else f'<{tag} {given}{start}/>'

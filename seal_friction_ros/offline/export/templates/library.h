@@ -12,7 +12,7 @@ extern "C" {
 #endif
 
 #define ${NAME}_NEVER INT64_MIN /* stamp of what has not come */
-#define ${NAME}_STATE_SIZE (32 + 8 * ${state_size}) /* [bytes] of a saved state */
+#define ${NAME}_STATE_SIZE (8 + 8 * ${state_size}) /* [bytes] of a saved state */
 
 ${enums}
 
@@ -33,7 +33,7 @@ bool ${name}_is_tick_due(${name}_pipeline_state *state, int64_t now);
 ${name}_state_friction ${name}_friction_on_rod(${name}_rod_load load);
 
 /* A state as ${NAME}_STATE_SIZE bytes, the same on every machine. load reads as many, and refuses those of another
- * configuration or layout. */
+ * configuration or layout, or damaged ones; the state is then as before. */
 void ${name}_save(const ${name}_pipeline_state *state, uint8_t *bytes);
 bool ${name}_load(${name}_pipeline_state *state, const uint8_t *bytes);
 

@@ -5,14 +5,7 @@
 #include <string>
 #include <type_traits>
 #include <vector>
-
-namespace rclcpp {
-struct Time {
-  int64_t value;
-  int64_t nanoseconds() const { return value; }
-};
-struct Duration {};
-}
+#include <rclcpp/rclcpp.hpp>
 
 namespace rclcpp_lifecycle {
 struct State {};
