@@ -8,8 +8,8 @@ Each cell has three unknowns: gap h, film pressure p and saturation theta. Three
 with the rigid gap g (negative where the seal overlaps the wall), the compliance K of the half-plane (`elasticity`) and
 the contact pressure p_c (`topography`). Newton's method solves all three together. Its linear system is dense through
 K, but the inverse of K decays as 1 / r^2: a banded approximation gives a banded system, which is solved directly and
-preconditions GMRES on the elastic equation, with K by fast Fourier transform. A step costs n log n, and the flow is
-balanced to rounding whatever the tolerance of the elastic equation.
+preconditions GMRES on the elastic equation. The flow is balanced to rounding whatever the tolerance of the elastic
+equation.
 
 Scheme and preconditioner are our choice; GMRES: Y. Saad, M. H. Schultz 1986.
 """
@@ -329,7 +329,7 @@ def dry_contact(contact: LubricatedContact, rigid_gap: FloatArray, guess: FloatA
     NotConvergedError: Newton's method did not converge.
     """
     plane = contact.body
-    matrix = plane.matrix()
+    matrix = plane.matrix
     gap = np.array(rigid_gap if guess is None else guess)
     identity: Any = np.eye(plane.cells)
     for _iteration in range(_ITERATIONS):

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
-from seal_friction_ros.core.lubrication.elasticity import ElasticBody, HalfPlane, condensed_body
+from seal_friction_ros.core.lubrication.elasticity import ElasticBody, condensed_body, half_plane
 from seal_friction_ros.core.lubrication.seal_profile import LubricationNumerics, SealBody
 from seal_friction_ros.core.oring_contact.compliance import small_displacements
 from seal_friction_ros.core.oring_contact.equilibrium import OringModel, make_model, unstressed_state
@@ -91,7 +91,7 @@ def seal_body(seal: SealBody, numerics: LubricationNumerics) -> ElasticBody:
     """
     cells, width = numerics.cells, numerics.film_width / numerics.cells
     if seal.body != 'finite_elements':
-        return HalfPlane(cells, width, seal.modulus, seal.section_height)
+        return half_plane(cells, width, seal.modulus, seal.section_height)
     section = seal_section(seal, numerics.film_width, numerics.section_elements)
     places: FloatArray = np.asarray((np.arange(cells) + 0.5) * width - 0.5 * numerics.film_width)
     circumference = math.pi * seal.sealing_diameter

@@ -21,7 +21,7 @@ from seal_friction_ros.core.lubrication.contact import (
     dry_contact,
     film_properties,
 )
-from seal_friction_ros.core.lubrication.elasticity import HalfPlane
+from seal_friction_ros.core.lubrication.elasticity import ElasticBody, half_plane
 from seal_friction_ros.core.lubrication.flow_factors import shear_stress_coefficients, shear_stress_factors
 from seal_friction_ros.core.lubrication.grease import Grease
 from seal_friction_ros.core.lubrication.reynolds import FilmEnds
@@ -40,7 +40,7 @@ def profile(cells: int, interference: float = 36e-6):
 
 
 def made(cells: int, topography: Topography = ROUGH, grease: Grease = GREASE) -> LubricatedContact:
-    return LubricatedContact(HalfPlane(cells, LENGTH / cells, MODULUS, DEPTH), topography, grease)
+    return LubricatedContact(half_plane(cells, LENGTH / cells, MODULUS, DEPTH), topography, grease)
 
 
 def slid(
@@ -173,7 +173,7 @@ def test_every_step_conserves_mass_and_keeps_film_and_void_apart():
         assert np.abs(state.pressure / 1e6 * (1.0 - state.saturation)).max() <= 1e-12
         assert state.pressure.min() >= -1e-6
         solid, _ = asperity_pressure(state.gap, contact.asperities)
-        elastic = state.gap - profile(226) - contact.body.matrix() @ (state.pressure + solid)
+        elastic = state.gap - profile(226) - contact.body.matrix @ (state.pressure + solid)
         assert np.abs(elastic).max() <= 2e-13
 
 
@@ -280,7 +280,7 @@ def test_what_does_not_converge_says_which_part_of_it(monkeypatch):
 class Counted:
     """A body that counts how often it is deflected."""
 
-    def __init__(self, body: HalfPlane) -> None:
+    def __init__(self, body: ElasticBody) -> None:
         self._body, self.deflections = body, 0
 
     def __getattr__(self, name):
@@ -294,7 +294,7 @@ class Counted:
 @pytest.mark.parametrize('compliance_factor', [1.0, 0.25, 0.0625])
 def test_banded_stiffness_prepares_the_elastic_equation_whatever_share_of_the_compliance_acts(compliance_factor):
     """A solve of GMRES that is well prepared needs few products, each one deflection; so does the whole step."""
-    body = Counted(HalfPlane(96, LENGTH / 96, MODULUS, DEPTH))
+    body = Counted(half_plane(96, LENGTH / 96, MODULUS, DEPTH))
     contact = LubricatedContact(body, ROUGH, GREASE)
     start = dry(contact)
     rigid = profile(96) + (1.0 - compliance_factor) * (start.gap - profile(96))  # the rest has crept
@@ -317,7 +317,7 @@ def test_plates_that_creep_under_high_pressure_carry_their_film_along(velocity):
     That error over a cell, 2e-9 Pa / 19 um, moves 8e-17 m^2/s; the walls move 5e-11 m^2/s, and have to within 1e-13.
     """
     oil = Grease(yield_stress=0.0, consistency_index=0.0, base_viscosity=0.1)
-    contact = LubricatedContact(HalfPlane(32, LENGTH / 32, 1e13, DEPTH), ROUGH, oil)
+    contact = LubricatedContact(half_plane(32, LENGTH / 32, 1e13, DEPTH), ROUGH, oil)
     even, rigid = np.ones(32), np.full(32, 1e-4)
     gap = rigid + contact.body.deflection(1e7 * even)
     away = ContactState(gap, 1e7 * (1.0 + 1e-9 * np.sin(np.arange(32.0))), even)

@@ -134,7 +134,7 @@ def test_seal_at_rest_under_air_touches_as_without_it_and_has_crept_under_all_of
     start = initial_state(model, 0.0)
     solid, _ = asperity_pressure(start.state.gap, model.contact.asperities)
     rigid = model.place**2 / 2e-3 - 60e-6  # 36 um, and 60 um/MPa of 0.4 MPa
-    matrix = model.contact.body.matrix()
+    matrix = model.contact.body.matrix
     assert start.state.gap == pytest.approx(rigid + matrix @ solid, abs=1e-12)
     assert start.state.pressure == pytest.approx(model.ambient)
     assert start.creep == pytest.approx(np.stack([0.375 * matrix @ (solid + model.ambient)] * 2), rel=1e-9)
@@ -155,7 +155,7 @@ def test_seal_gives_way_at_once_by_a_quarter_and_creeps_towards_the_rest():
     start = initial_state(model, 0.0)
     after, *_ = transient_step(model, start, 5e-3, 0.2e-3)
     solid, _ = asperity_pressure(after.state.gap, model.contact.asperities)
-    deflected = model.contact.body.matrix() @ (after.state.pressure + solid)
+    deflected = model.contact.body.matrix @ (after.state.pressure + solid)
     for part, time in enumerate((0.01, 0.1)):
         rate = (after.creep[part] - start.creep[part]) / 5e-3
         assert time * rate == pytest.approx(0.375 * deflected - after.creep[part], rel=1e-6, abs=1e-12)
