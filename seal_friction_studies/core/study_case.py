@@ -23,7 +23,7 @@ from seal_friction_ros.core.foundation.parameters import (
 )
 from seal_friction_ros.core.lubrication.elasticity import ElasticBody
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, PressureSqueeze, no_oring, parse_case
-from seal_friction_ros.core.lubrication.seal_profile import BODIES, LubricationNumerics, SealBody
+from seal_friction_ros.core.lubrication.seal_section import BODIES, LubricationNumerics, SealBody
 from seal_friction_ros.core.oring_contact.oring_case_file import OringCaseFile
 from seal_friction_studies.core.bonded_layer import bonded_layer
 from seal_friction_studies.core.groove import GrooveSpring

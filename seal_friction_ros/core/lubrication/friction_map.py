@@ -18,10 +18,10 @@ from seal_friction_ros.core.lubrication.model import (
     film_at_rest,
     fluid_force,
     profile_model,
+    real_area_share,
     solid_limit,
 )
 from seal_friction_ros.core.lubrication.oring_film import oring_film, oring_films
-from seal_friction_ros.core.lubrication.shear import real_area_share
 from seal_friction_ros.core.oring_contact.ring_friction import DISCRETISATION
 
 _PASSAGES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0, 100.0, math.inf)  # steps to the steady film

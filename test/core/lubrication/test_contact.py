@@ -24,8 +24,8 @@ from seal_friction_ros.core.lubrication.contact import (
 from seal_friction_ros.core.lubrication.elasticity import ElasticBody, half_plane
 from seal_friction_ros.core.lubrication.flow_factors import shear_stress_coefficients, shear_stress_factors
 from seal_friction_ros.core.lubrication.grease import Grease
+from seal_friction_ros.core.lubrication.model import fluid_shear, real_area_share, solid_shear
 from seal_friction_ros.core.lubrication.reynolds import FilmEnds
-from seal_friction_ros.core.lubrication.shear import fluid_shear, real_area_share, solid_shear
 from seal_friction_ros.core.lubrication.topography import Topography
 
 LENGTH, RADIUS, MODULUS, DEPTH = 0.6e-3, 1e-3, 14.28e6, 1e-3  # [m], [m], [Pa], [m]

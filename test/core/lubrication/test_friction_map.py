@@ -24,7 +24,7 @@ from seal_friction_ros.core.lubrication.grease import Grease
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, MapGrid
 from seal_friction_ros.core.lubrication.model import film_at_rest, profile_model, solid_limit
 from seal_friction_ros.core.lubrication.oring_film import oring_film
-from seal_friction_ros.core.lubrication.seal_profile import LubricationNumerics
+from seal_friction_ros.core.lubrication.seal_section import LubricationNumerics
 from seal_friction_ros.core.lubrication.topography import Topography
 from seal_friction_ros.core.messages.records import Force, Pressure
 from seal_friction_ros.core.oring_contact.oring_case import OringNumerics

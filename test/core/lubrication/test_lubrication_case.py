@@ -15,7 +15,7 @@ from seal_friction_ros.core.lubrication.lubrication_case import (
     parse_lubrication_case,
     varied_case,
 )
-from seal_friction_ros.core.lubrication.seal_profile import SealBody
+from seal_friction_ros.core.lubrication.seal_section import SealBody
 from seal_friction_ros.core.lubrication.topography import Topography
 from seal_friction_ros.core.oring_contact.material import elastic_modulus_of_hardness
 from seal_friction_ros.core.oring_contact.oring_case_file import OringCaseFile, parse_oring_case

@@ -16,7 +16,7 @@ from seal_friction_ros.core.lubrication.friction_map import steady_state
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
 from seal_friction_ros.core.lubrication.model import fluid_force, solid_limit
 from seal_friction_ros.core.lubrication.oring_film import FILM_CROWDING, OringFilm, flat_part, oring_film
-from seal_friction_ros.core.lubrication.seal_profile import LubricationNumerics
+from seal_friction_ros.core.lubrication.seal_section import LubricationNumerics
 from seal_friction_ros.core.lubrication.topography import Topography
 from seal_friction_ros.core.oring_contact.compliance import SlidingFace, sliding_face
 from seal_friction_ros.core.oring_contact.loading import loaded_states, oring_model

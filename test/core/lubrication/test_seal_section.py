@@ -9,8 +9,9 @@ from seal_bodies import contact_forces
 
 from seal_friction_ros.core.lubrication.elasticity import half_plane
 from seal_friction_ros.core.lubrication.lubrication_case import parse_lubrication_case
-from seal_friction_ros.core.lubrication.seal_profile import LubricationNumerics, SealBody
 from seal_friction_ros.core.lubrication.seal_section import (
+    LubricationNumerics,
+    SealBody,
     SealSection,
     face_compliance,
     seal_body,

@@ -15,8 +15,8 @@ from seal_friction_ros.core.lubrication.flow_factors import (
     shear_stress_factors,
 )
 from seal_friction_ros.core.lubrication.grease import Grease, apparent_viscosity
+from seal_friction_ros.core.lubrication.model import fluid_shear, real_area_share, solid_shear
 from seal_friction_ros.core.lubrication.reynolds import FilmEnds
-from seal_friction_ros.core.lubrication.shear import fluid_shear, real_area_share, solid_shear
 from seal_friction_ros.core.lubrication.topography import Topography
 
 CELLS, WIDTH, MODULUS = 20, 5e-6, 1e7  # [1], [m], [Pa]

@@ -11,7 +11,7 @@ from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.lubrication.friction_map import SteadyFriction
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, MapGrid
-from seal_friction_ros.core.lubrication.seal_profile import LubricationNumerics
+from seal_friction_ros.core.lubrication.seal_section import LubricationNumerics
 from seal_friction_ros.core.messages.records import Status
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.bags.recorded_run import read_run
