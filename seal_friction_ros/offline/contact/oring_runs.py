@@ -44,13 +44,9 @@ ON_OTHER_MESHES = (
 """Numbers of an `OringSummary` that are compared with other meshes; leakage and radial force are differences."""
 
 
-@dataclass(frozen=True)
-class Profile:
-    """Contact stress along a wall, at the nodes in contact, shape (n,)."""
-
-    position_m: tuple[float, ...]
-    """along rod and gland from the middle of the free ring, positive downstream; for the wall the radius"""
-    stress_Pa: tuple[float, ...]
+Profile = dict[str, list[float]]
+"""Contact stress along a wall, at the nodes in contact: ``stress_Pa`` at ``position_m``, which is along rod and gland
+from the middle of the free ring, positive downstream; for the wall the radius."""
 
 
 @dataclass(frozen=True)
@@ -247,7 +243,7 @@ def _summary(
 
 
 def _profile(contact: WallContact) -> Profile:
-    return Profile(tuple(contact.position.tolist()), tuple(contact.stress.tolist()))
+    return {'position_m': contact.position.tolist(), 'stress_Pa': contact.stress.tolist()}
 
 
 def seal_document(computed: Computed, spread: Spread | None = None) -> dict[str, Any]:
