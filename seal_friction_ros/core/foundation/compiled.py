@@ -281,9 +281,13 @@ def _names_of(kind: type) -> tuple[str, ...]:
 
 
 def _is_numeric(value: Any) -> bool:
-    """Whether compiled code has a place for it: a number, a function with bound parameters, none, or tuples of such."""
+    """Whether compiled code has a place for it: a number, a function with bound parameters, none, or tuples of such.
+
+    A named tuple may hold dataclasses.
+    """
     if isinstance(value, tuple):
-        return all(map(_is_numeric, value))
+        is_record = hasattr(value, '_fields')
+        return all(_is_numeric(each) or (is_record and dataclasses.is_dataclass(each)) for each in value)
     return value is None or isinstance(value, int | float | partial) or hasattr(value, 'dtype')
 
 
