@@ -34,10 +34,11 @@ from seal_friction_ros.core.lubrication.friction_map import (
     steady_rows,
 )
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, parse_lubrication_case, varied_case
-from seal_friction_ros.core.oring_contact.oring_case_file import OringCaseFile, parse_oring_case
+from seal_friction_ros.core.oring_contact.oring_case_file import OringCaseFile
 from seal_friction_ros.core.oring_contact.ring_friction import DISCRETISATION
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.contact.mesh_levels import COARSER, FINER, MOST_MESH_ERROR, change_of, other_lines
+from seal_friction_ros.offline.contact.oring_runs import read_oring_case
 from seal_friction_ros.offline.contact.section_files import with_files
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty
 from seal_friction_ros.offline.work.executor import Workers
@@ -69,17 +70,9 @@ def read_case(name: str, parse: Callable[[Any, Callable[[str], OringCaseFile]], 
 
 
 def load_oring(name: str, beside: Path) -> OringCaseFile:
-    """O-ring case file in the folder ``beside``, from a path, or of a name in config/oring.
-
-    ValueError: the file cannot be read or a value is invalid; one line that names the file.
-    """
+    """O-ring case file in the folder ``beside``, from a path, or of a name in config/oring; as `read_oring_case`."""
     local = beside / f'{name}.yaml'
-    path = local if local.is_file() else config_path('oring', name)
-    try:
-        return parse_oring_case(read_yaml(path))
-    except ValueError as error:
-        text = str(error)
-        raise ValueError(text if text.startswith(str(path)) else f'{path}: {text}') from None
+    return read_oring_case(local if local.is_file() else config_path('oring', name))
 
 
 def compile_for_map(case: LubricationCase) -> None:
