@@ -9,7 +9,7 @@ from harness.ehl_cases import COARSE_RING, answer, measured_bag
 from seal_friction_ros.core.foundation.errors import NotConvergedError
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
-from seal_friction_ros.core.lubrication.friction_map import SteadyFriction
+from seal_friction_ros.core.lubrication.friction_map import SteadyFriction, stacked
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, MapGrid
 from seal_friction_ros.core.lubrication.seal_section import LubricationNumerics
 from seal_friction_ros.core.messages.records import Status
@@ -42,7 +42,7 @@ def test_the_error_of_a_map_is_its_change_on_the_next_finer_mesh_or_on_the_coars
         if finer_fails and factor < 1.0:
             raise NotConvergedError('told to')
         rows = [SteadyFriction(p, np.array([2.0, 1.0]), np.ones(2), np.zeros(2), 1e5, 0) for p in (0.0, 1e5)]
-        return runs.table_of([row._replace(friction=factor * row.friction) for row in rows])
+        return stacked(row._replace(friction=factor * row.friction) for row in rows)
 
     monkeypatch.setattr(runs, 'steady_table', table)
     assert runs.run_map(case, 1).mesh_error == pytest.approx(np.full((2, 2), 0.08))
