@@ -151,16 +151,10 @@ def before_compiling(tell: Callable[[], object]) -> Iterator[None]:
 
 def make_known() -> None:
     """Let compiled code call every function that was marked `compilable` up to now."""
-    from numba.extending import register_jitable
-
     _teach_the_compiler()
     while _waiting:
         function = _waiting.pop()
-        known = _with_unrolled_loops(function)
-        if known is function:
-            register_jitable(**INNER)(function)
-        else:
-            _stand_in(function, known)
+        _stand_in(function, _with_unrolled_loops(function))
 
 
 def unrolled(records: Any) -> Any:

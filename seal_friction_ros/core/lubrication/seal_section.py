@@ -124,13 +124,6 @@ class SealSection(NamedTuple):
     held: tuple[int, ...]  # displacements that the groove holds (2 node for r, 2 node + 1 for z)
 
 
-class FaceCompliance(NamedTuple):
-    """How the face of the section gives way to small loads."""
-
-    off_wall: FloatArray  # displacement off the wall by a force off it on a node, all round [m/N], shape (m, m)
-    axial_stiffness: float  # axial force spread over the middle half of the face, over its mean displacement [N/m]
-
-
 def seal_section(seal: SealBody, film_width: float, elements: int) -> SealSection:
     """Mesh of the section of a seal: ``elements`` of one width under the film, larger ones elsewhere."""
     first, growth = film_width / elements, 1.0 + _GROWTH / elements
@@ -155,18 +148,17 @@ def section_rubber(seal: SealBody) -> Rubber:
     return Rubber(elastic_modulus=0.75 * seal.modulus, mooney_ratio=min(ratio, _STEEPEST_MOONEY_RATIO))
 
 
-def face_compliance(section: SealSection) -> FaceCompliance:
-    """Compliance of the face of the unloaded section, held at its groove.
+def face_compliance(section: SealSection) -> FloatArray:
+    """Displacement of the face off the wall by a force off it on a node, all round [m/N], shape (m, m).
 
-    NotConvergedError: the stiffness is singular.
+    The section is unloaded, held at its groove. NotConvergedError: the stiffness is singular.
     """
     model, face = section.model, section.face
-    middle = np.abs(section.place) <= 0.25 * np.ptp(section.place)
-    loads = np.zeros((model.mesh.nodes.size, len(face) + 1))
+    loads = np.zeros((model.mesh.nodes.size, len(face)))
     loads[2 * face, np.arange(len(face))] = 1.0
-    loads[2 * face + 1, -1] = middle / middle.sum()
-    moved = small_displacements(model, nothing_around(model), unstressed_state(model), loads, held=section.held)
-    return FaceCompliance(moved[2 * face, :-1], 1.0 / float(loads[2 * face + 1, -1] @ moved[2 * face + 1, -1]))
+    return small_displacements(model, nothing_around(model), unstressed_state(model), loads, held=section.held)[
+        2 * face
+    ]
 
 
 def nothing_around(model: OringModel) -> Surroundings:
@@ -186,7 +178,7 @@ def seal_body(seal: SealBody, numerics: LubricationNumerics) -> ElasticBody:
     section = seal_section(seal, numerics.film_width, numerics.section_elements)
     places: FloatArray = np.asarray((np.arange(cells) + 0.5) * width - 0.5 * numerics.film_width)
     circumference = math.pi * seal.sealing_diameter
-    return condensed_body(places, section.place, face_compliance(section).off_wall, seal.modulus, circumference)
+    return condensed_body(places, section.place, face_compliance(section), seal.modulus, circumference)
 
 
 def _graded(length: float, first: float, growth: float) -> FloatArray:

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from harness.section_stiffness import axial_stiffness
 from scipy.sparse import coo_array
 from seal_bodies import contact_forces
 
@@ -83,18 +84,18 @@ def test_patch_an_even_strain_leaves_no_force_inside():
 
 @pytest.mark.parametrize('hold', ['bottom', 'bottom_and_flanks', 'sliding_bottom'])
 def test_the_face_is_reciprocal_and_gives_way_to_every_pressure(hold):
-    compliance = face_compliance(seal_section(dataclasses.replace(SEAL, section_hold=hold), FILM, 24)).off_wall
+    compliance = face_compliance(seal_section(dataclasses.replace(SEAL, section_hold=hold), FILM, 24))
     assert np.abs(compliance - compliance.T).max() < 1e-10 * np.abs(compliance).max()
     assert np.linalg.eigvalsh(0.5 * (compliance + compliance.T)).min() > 0.0
 
 
 def test_the_more_the_groove_holds_the_stiffer_is_the_section():
-    compliances = [
-        face_compliance(seal_section(dataclasses.replace(SEAL, section_hold=hold), FILM, 16))
+    sections = [
+        seal_section(dataclasses.replace(SEAL, section_hold=hold), FILM, 16)
         for hold in ('sliding_bottom', 'bottom', 'bottom_and_flanks')
     ]
-    assert (np.diff([c.off_wall.sum() for c in compliances]) < 0.0).all()
-    assert (np.diff([c.axial_stiffness for c in compliances]) > 0.0).all()
+    assert (np.diff([face_compliance(section).sum() for section in sections]) < 0.0).all()
+    assert (np.diff([axial_stiffness(section) for section in sections]) > 0.0).all()
 
 
 @pytest.mark.parametrize(('c10', 'c01', 'ratio'), [(1e6, 0.5e6, 0.5), (0.1e6, 0.9e6, 9.0), (0.0, 2e6, 10.0)])
@@ -148,7 +149,7 @@ def test_wide_flat_section_is_sheared_along_the_axis_by_half_of_its_face():
     seal = dataclasses.replace(
         FAR, section_height=height, section_width=24.0 * height, crown_radius_left=1.0, crown_radius_right=1.0
     )
-    found = face_compliance(seal_section(seal, 20.0 * height, 64)).axial_stiffness
+    found = axial_stiffness(seal_section(seal, 20.0 * height, 64))
     even = seal.modulus / 4.0 * 10.0 * height * np.pi * seal.sealing_diameter / height
     assert even < found < 1.2 * even
 
