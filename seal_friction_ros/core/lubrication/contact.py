@@ -107,11 +107,10 @@ class LubricatedContact:
         t = self.topography
         return t.rms_height if t.shear_stress_factors else 0.0, shear_stress_coefficients(t.peklenik_number)
 
-    @property
-    def asperities(self) -> tuple[float, float, bool]:
-        """Arguments of `topography.contact_pressure` before the separation."""
+    def asperity_pressure(self, gap: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Contact pressure [Pa] and its derivative [Pa/m] in each cell at a ``gap`` [m]."""
         t = self.topography
-        return t.contact_stiffness(self.body.modulus), t.separation_length, t.filling
+        return contact_pressure(t.contact_stiffness(self.body.modulus), t.separation_length, t.filling, gap)
 
 
 @compiled
@@ -148,16 +147,6 @@ def film_properties(
         properties[2, i] = h + rms * asymmetry * shear
         properties[3, i] = inside * (1.0 + asymmetry * shear_slope)
     return properties
-
-
-@compiled
-def asperity_pressure(gap: FloatArray, asperities: tuple[float, float, bool]) -> tuple[FloatArray, FloatArray]:
-    """Contact pressure [Pa] and its derivative [Pa/m] in each cell."""
-    n = gap.shape[0]
-    pressure, slope = np.empty(n), np.empty(n)
-    for i in range(n):
-        pressure[i], slope[i] = contact_pressure(asperities[0], asperities[1], asperities[2], gap[i])
-    return pressure, slope
 
 
 @compiled
@@ -295,7 +284,7 @@ def contact_step(
             gap, pressure, saturation, properties, 0.5 * wall_velocity, rate, old_thickness, plane.cell_width, ends
         )
         kept, imperfection = complementarity(pressure, saturation, _PRESSURE_SCALE)
-        solid, slope = asperity_pressure(gap, contact.asperities)
+        solid, slope = contact.asperity_pressure(gap)
         elastic = gap - rigid_gap - compliance_factor * plane.deflection(pressure + solid)
         largest_flow = (
             _LEAST_FLOW + float(np.abs(flow).max()) + rate * plane.cell_width * float(np.abs(old_thickness).max())
@@ -333,7 +322,7 @@ def dry_contact(contact: LubricatedContact, rigid_gap: FloatArray, guess: FloatA
     gap = np.array(rigid_gap if guess is None else guess)
     identity: Any = np.eye(plane.cells)
     for _iteration in range(_ITERATIONS):
-        solid, slope = asperity_pressure(gap, contact.asperities)
+        solid, slope = contact.asperity_pressure(gap)
         elastic = gap - rigid_gap - matrix @ solid
         if np.abs(elastic).max() <= _GAP_TOLERANCE:
             return gap

@@ -12,7 +12,6 @@ from seal_friction_ros.core.lubrication.contact import (
     THINNEST,
     ContactState,
     LubricatedContact,
-    asperity_pressure,
     dry_contact,
 )
 from seal_friction_ros.core.lubrication.flow_factors import shear_stress_factors
@@ -85,7 +84,7 @@ def solid_limit(model: LubricationModel, state: ContactState) -> float:
 
 def real_area_share(contact: LubricatedContact, gap: FloatArray) -> FloatArray:
     """Local share A_real of the surface that touches, shape (n,), at a ``gap`` [m]; see `Topography`."""
-    pressure, _ = asperity_pressure(gap, contact.asperities)
+    pressure, _ = contact.asperity_pressure(gap)
     return np.asarray(erf(pressure / contact.topography.real_area_pressure(contact.body.modulus)))
 
 

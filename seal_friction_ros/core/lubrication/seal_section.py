@@ -156,9 +156,8 @@ def face_compliance(section: SealSection) -> FloatArray:
     model, face = section.model, section.face
     loads = np.zeros((model.mesh.nodes.size, len(face)))
     loads[2 * face, np.arange(len(face))] = 1.0
-    return small_displacements(model, nothing_around(model), unstressed_state(model), loads, held=section.held)[
-        2 * face
-    ]
+    moved = small_displacements(model, nothing_around(model), unstressed_state(model), loads, held=section.held)
+    return moved[2 * face]
 
 
 def nothing_around(model: OringModel) -> Surroundings:

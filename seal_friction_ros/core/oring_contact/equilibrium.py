@@ -82,11 +82,9 @@ def make_model(
     )
 
 
-def unstressed_state(model: OringModel, displacement: FloatArray | None = None) -> OringState:
-    """State without tension; ``displacement`` [m], shape (2 n,), is zero by default."""
-    if displacement is None:
-        displacement = np.zeros(model.mesh.nodes.size)
-    return OringState(displacement, np.zeros(len(model.mesh.elements)))
+def unstressed_state(model: OringModel) -> OringState:
+    """State without displacement and tension."""
+    return OringState(np.zeros(model.mesh.nodes.size), np.zeros(len(model.mesh.elements)))
 
 
 def outline(model: OringModel, state: OringState) -> FloatArray:

@@ -16,7 +16,6 @@ from seal_friction_ros.core.lubrication import contact as contact_module
 from seal_friction_ros.core.lubrication.contact import (
     ContactState,
     LubricatedContact,
-    asperity_pressure,
     contact_step,
     dry_contact,
     film_properties,
@@ -83,7 +82,7 @@ def thick_film(cells: int, velocity: float = 0.2):
     """Smooth soft contact, fully lifted: the dry rough contact gives a first guess."""
     rough = made(cells)
     gap = dry_contact(rough, profile(cells))
-    pressure, _ = asperity_pressure(gap, rough.asperities)
+    pressure, _ = rough.asperity_pressure(gap)
     smooth = made(cells, SMOOTH, OIL)
     return smooth, slid(
         smooth, ContactState(gap + 1e-6, pressure, np.ones(cells)), velocity, (0.01, 0.1, 1, 10, 100, math.inf)
@@ -93,7 +92,7 @@ def thick_film(cells: int, velocity: float = 0.2):
 def test_dry_contact_carries_nearly_the_pressure_of_hertz():
     contact = made(226, Topography(rms_height=0.2e-6, rms_slope=0.9, roll_off_length=2e-6))
     state = dry(contact)
-    pressure, _ = asperity_pressure(state.gap, contact.asperities)
+    pressure, _ = contact.asperity_pressure(state.gap)
     load = pressure.sum() * LENGTH / 226
     assert pressure.max() == pytest.approx(math.sqrt(load * MODULUS / (math.pi * RADIUS)), rel=0.02)
 
@@ -172,7 +171,7 @@ def test_every_step_conserves_mass_and_keeps_film_and_void_apart():
         assert abs(volume - old.sum() * LENGTH / 226 - gained) <= 1e-12 * volume
         assert np.abs(state.pressure / 1e6 * (1.0 - state.saturation)).max() <= 1e-12
         assert state.pressure.min() >= -1e-6
-        solid, _ = asperity_pressure(state.gap, contact.asperities)
+        solid, _ = contact.asperity_pressure(state.gap)
         elastic = state.gap - profile(226) - contact.body.matrix @ (state.pressure + solid)
         assert np.abs(elastic).max() <= 2e-13
 
