@@ -206,16 +206,11 @@ def _solve_band(band: FloatArray, elastic: FloatArray, flow: FloatArray) -> tupl
     return x[0::2].copy(), x[1::2].copy()
 
 
-@compiled
 def _flow_right_side(residual: FloatArray, rows: FloatArray, kept: FloatArray) -> FloatArray:
     """Right-hand side of the Reynolds rows once the complementarity is eliminated, shape (n,)."""
-    n = residual.shape[0]
-    right = np.empty(n)
-    for i in range(n):
-        total = -residual[i]
-        for j in range(max(0, i - 1), min(n, i + 2)):
-            total -= rows[0, j - i + 1, i] * kept[0, j] + rows[1, j - i + 1, i] * kept[2, j]
-        right[i] = total
+    known = np.pad(kept[::2], ((0, 0), (1, 1)))  # change of pressure and saturation; nothing beyond both ends
+    around = np.stack([known[:, k : k + len(residual)] for k in range(3)], axis=1)
+    right: FloatArray = -residual - (rows[:2] * around).sum(axis=(0, 1))
     return right
 
 

@@ -6,7 +6,6 @@ from statistics import fmean
 from typing import Any
 
 import numpy as np
-from scipy.stats import spearmanr
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.unknowns import Unknown
@@ -73,10 +72,10 @@ class Uncertainty:
         About 1 / sqrt(samples) off: less says nothing.
         """
         kept = np.delete(self.drawn, sorted(self.failed), axis=0)
-        forces = self.computed.reshape(len(kept), -1).T
+        forces = _ranks(self.computed.reshape(len(kept), -1))
         return {
-            name: fmean(float(spearmanr(column, force).statistic) for force in forces)
-            for name, column in zip(self.names, kept.T, strict=True)
+            name: fmean(float(np.corrcoef(column, force)[0, 1]) for force in forces.T)
+            for name, column in zip(self.names, _ranks(kept).T, strict=True)
         }
 
     def numbers(self, quantity: str = 'friction_N') -> dict[str, Any]:
@@ -118,3 +117,8 @@ class Uncertainty:
 def _quantiles(samples: FloatArray, shares: Sequence[float]) -> FloatArray:
     """Quantiles along the first axis; sample k of N stands for the middle of the kth of N equal parts (Hazen)."""
     return np.asarray(np.quantile(samples, shares, axis=0, method='hazen'))
+
+
+def _ranks(columns: FloatArray) -> FloatArray:
+    """Rank of each value in its column."""
+    return np.asarray(np.argsort(np.argsort(columns, axis=0), axis=0), dtype=float)
