@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.parameters import meanings
+from seal_friction_ros.core.foundation.parameters import within_bounds
 from seal_friction_ros.core.servo import closed_loop
 from seal_friction_ros.core.servo.closed_loop import (
     EVALUATED_PERIODS,
@@ -165,9 +165,7 @@ class TuningProblem:
 
 def bounded(name: str, value: float) -> float:
     """Value of a setting of the feed-forward, clamped to its bounds."""
-    meaning = meanings(FeedForwardSettings)[name]
-    lower, upper = meaning.lower, meaning.upper
-    return min(max(value, lower if lower is not None else value), upper if upper is not None else value)
+    return float(within_bounds(FeedForwardSettings, name, value))
 
 
 def force_limit(friction: float) -> float:

@@ -16,6 +16,7 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.errors import NotConvergedError, named_errors
+from seal_friction_ros.core.foundation.parameters import within_bounds
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.presliding import presliding_of_map
@@ -47,7 +48,6 @@ from seal_friction_ros.offline.work.outcome import Outcome
 from seal_friction_ros.offline.work.seal_writer import rounded
 
 Parsed = TypeVar('Parsed')
-_FEWEST_CELLS = 32  # that a case may have
 LEAST_ASYMMETRY = 0.01  # [-] that a seal file has: less is an error of the mesh (our choice)
 STICTION_OF_A_RING = 0.13
 """[-] breakaway over sliding friction, less 1, of a map without speeds: mean of the thesis (our choice)"""
@@ -77,9 +77,9 @@ def load_oring(name: str, beside: Path) -> OringCaseFile:
 
 def compile_for_map(case: LubricationCase) -> None:
     """Compile the code of a friction map in this process, so that worker processes inherit it."""
-    numerics, grid = replace(case.numerics, cells=_FEWEST_CELLS), replace(case.map, velocities=2)
+    numerics = replace(case.numerics, cells=within_bounds(case.numerics, 'cells', 0))  # the fewest
     with suppress(NotConvergedError):
-        steady_friction(replace(case, oring=None, numerics=numerics, map=grid), 0.0)
+        steady_friction(replace(case, oring=None, numerics=numerics, map=replace(case.map, velocities=2)), 0.0)
 
 
 class MapRuns(NamedTuple):
@@ -199,7 +199,7 @@ def needed(outcome: Outcome[Values]) -> Values:
 
 def other_mesh(case: LubricationCase, factor: float) -> LubricationCase:
     """The case with ``factor`` times as many cells, and lines of the elements of a ring."""
-    cells = max(round(factor * case.numerics.cells), _FEWEST_CELLS)
+    cells = within_bounds(case.numerics, 'cells', round(factor * case.numerics.cells))
     case = replace(case, numerics=replace(case.numerics, cells=cells))
     if case.oring is None:
         return case

@@ -56,6 +56,12 @@ def test_the_other_meshes_of_a_ring_have_other_elements_and_cells():
     assert [(other.oring.numerics.lines, other.numerics.cells) for other in others] == [(23, 448), (46, 896)]
 
 
+def test_the_other_meshes_of_a_case_have_as_many_cells_as_it_may_have():
+    for cells, factor, found in ((32, 0.7, 32), (40, 0.7, 32), (3000, 1.4, 4000)):
+        case = LubricationCase(name='seal', numerics=LubricationNumerics(cells=cells))
+        assert runs.other_mesh(case, factor).numerics.cells == found
+
+
 def test_recording_with_a_mapped_seal_replays_to_the_same_bytes_and_rubs_less_the_faster_it_slides(small, tmp_path):
     seal_file = tmp_path / 'mapped.yaml'
     assert main(['ehl', 'map', small, '--seal-file', str(seal_file), '--jobs', '1']) == 0
