@@ -21,7 +21,7 @@ from seal_friction_ros.core.estimation.estimator import EstimatorParameters, ini
 from seal_friction_ros.core.estimation.records import RodSample
 from seal_friction_ros.core.friction.actuator import MountedSeal, Seal, Uncertainty
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
-from seal_friction_ros.core.lubrication.friction_map import friction_map, map_pressures, memory_length, steady_friction
+from seal_friction_ros.core.lubrication.friction_map import friction_map, memory_length, steady_table
 from seal_friction_ros.core.messages.records import Force, Pressure
 from seal_friction_ros.files import default_configuration
 from seal_friction_studies.core.study_case import StudyCase
@@ -57,8 +57,7 @@ def times(
     by_cells = [one_cycle(of_grid(case, count, steps[len(steps) // 2])) for count in cells]
     by_steps = [one_cycle(of_grid(case, cells[0], step)) for step in steps]
     start = processor_time()
-    rows = [steady_friction(case, float(pressure)) for pressure in map_pressures(case.map)]
-    law = friction_map(case, rows, memory_length(case).length)
+    law = friction_map(case, steady_table(case), memory_length(case).length)
     map_time = processor_time() - start
     return {
         **{f'cycle, {count} cells [s]': value for count, value in zip(cells, by_cells, strict=True)},

@@ -18,7 +18,7 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 
-from seal_friction_ros.core.foundation.compiler_hooks import CompilerHooks, set_hooks
+from seal_friction_ros.core.foundation.compiled import CompilerHooks, set_hooks
 
 VARIABLE = 'NUMBA_CACHE_DIR'
 KEPT_FOR = 30.0  # [days] after its last use the code of another version is removed

@@ -1,17 +1,16 @@
 """Deflection of the seal surface under pressure: a layer bonded to a rigid base."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import toeplitz
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.lubrication.elasticity import HalfPlane, influence_of_cells
+from seal_friction_ros.core.lubrication.elasticity import ElasticBody, influence_of_cells
 
 
-@dataclass(frozen=True, eq=False)
-class BondedLayer(HalfPlane):
-    r"""Influence matrix of an incompressible layer of height ``depth`` h, bonded to a rigid base.
+def bonded_layer(cells: int, cell_width: float, modulus: float, height: float) -> ElasticBody:
+    r"""An incompressible layer of ``height`` h [m] on cells of a width [m], bonded to a rigid base.
 
     A pressure of wave number q deflects it by :math:`2 S(q h) / (E^* q)`, in plane strain without friction,
 
@@ -26,12 +25,10 @@ class BondedLayer(HalfPlane):
     Analysis of the adhesive contact of confined layers by using a Green's function approach, J. Mech. Phys. Solids 56,
     2008, pp. 684-706.
     """
-
-    def _influence(self) -> FloatArray:
-        distance = np.arange(self.cells)
-        smooth = _of_layer(np.asarray(distance * (self.cell_width / self.depth), dtype=np.float64))
-        deep = influence_of_cells(distance, self.cell_width, self.modulus, self.depth)
-        return np.asarray(deep + 2.0 * self.cell_width / (math.pi * self.modulus) * smooth)
+    distance = np.arange(cells)
+    smooth = _of_layer(np.asarray(distance * (cell_width / height), dtype=np.float64))
+    deep = influence_of_cells(distance, cell_width, modulus, height)
+    return ElasticBody(cell_width, modulus, toeplitz(deep + 2.0 * cell_width / (math.pi * modulus) * smooth))
 
 
 _LARGEST_WAVE_NUMBER = 25.0  # [1/h] S is 1 to the last digit beyond

@@ -23,9 +23,9 @@ from seal_friction_ros.core.foundation.parameters import (
 )
 from seal_friction_ros.core.lubrication.elasticity import ElasticBody
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, PressureSqueeze, no_oring, parse_case
-from seal_friction_ros.core.lubrication.seal_profile import BODIES, LubricationNumerics, SealBody
+from seal_friction_ros.core.lubrication.seal_section import BODIES, LubricationNumerics, SealBody
 from seal_friction_ros.core.oring_contact.oring_case_file import OringCaseFile
-from seal_friction_studies.core.bonded_layer import BondedLayer
+from seal_friction_studies.core.bonded_layer import bonded_layer
 from seal_friction_studies.core.groove import GrooveSpring
 from seal_friction_studies.core.kinematics import ConstantAcceleration
 from seal_friction_studies.core.wall import ControlEdge, FilmSupply
@@ -167,7 +167,7 @@ class StudyCase(LubricationCase):
         if self.seal.body != 'bonded_layer':
             return super().elastic_body()
         numerics = self.numerics
-        return BondedLayer(
+        return bonded_layer(
             numerics.cells, numerics.film_width / numerics.cells, self.seal.modulus, self.seal.section_height
         )
 

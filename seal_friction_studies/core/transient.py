@@ -20,7 +20,6 @@ from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.foundation.errors import NotConvergedError
 from seal_friction_ros.core.lubrication.contact import (
     ContactState,
-    asperity_pressure,
     contact_step,
     dry_contact,
     film_properties,
@@ -141,7 +140,7 @@ def initial_state(model: TransientModel, position: float) -> TransientState:
     lag = -case.seated_groove.half_clearance
     air_deflects = model.contact.body.deflection(model.ambient)
     gap = dry_contact(model.contact, model.rigid_gap(position - lag) + air_deflects)
-    pressure, _ = asperity_pressure(gap, model.contact.asperities)
+    pressure, _ = model.contact.asperity_pressure(gap)
     shares, _ = _creep(case)
     creep = np.outer(shares, model.contact.body.deflection(pressure + model.ambient))
     saturation, wall_film = np.ones(n), None
@@ -195,7 +194,7 @@ def transient_step(
     wall_film = moment.wall_film
     if wall_film is not None:
         wall_film = _wall_film_after(model, moment, wall_film, taken, done.flow * step, contact_place)
-    solid_pressure, _ = asperity_pressure(state.gap, contact.asperities)
+    solid_pressure, _ = contact.asperity_pressure(state.gap)
     deflected = contact.body.deflection(state.pressure + solid_pressure)
     creep = kept[:, None] * start.creep + np.outer(shares * (1.0 - kept), deflected)
     before = None if wall_film is not None else StepBefore(_thickness(moment), moment.creep, step, velocity)
@@ -251,7 +250,7 @@ def _edge_force(model: TransientModel, moment: TransientState) -> float:
     edge = model.case.control_edge
     if edge is None:
         return 0.0
-    solid, _ = asperity_pressure(moment.state.gap, model.contact.asperities)
+    solid, _ = model.contact.asperity_pressure(moment.state.gap)
     _, slope = edge.fall(moment.contact_place + model.place)
     axial = float(((moment.state.pressure + solid) * slope).sum()) * model.contact.body.cell_width
     return -model.circumference * axial
@@ -261,7 +260,7 @@ def _bottom_force(model: TransientModel, state: ContactState) -> float:
     """Normal force of the seal on the bottom of its groove [N]: that of film and asperities on its face."""
     if model.case.groove.friction_coefficient == 0.0:
         return 0.0
-    solid, _ = asperity_pressure(state.gap, model.contact.asperities)
+    solid, _ = model.contact.asperity_pressure(state.gap)
     return model.circumference * model.contact.body.cell_width * float((state.pressure + solid).sum())
 
 
@@ -396,7 +395,7 @@ def run_transient(
             iterations += newton
             worst = max(worst, defect)
         row = np.array([moment.time, moment.position, velocity, moment.lag, *forces])
-        solid_pressure, _ = asperity_pressure(moment.state.gap, model.contact.asperities)
+        solid_pressure, _ = model.contact.asperity_pressure(moment.state.gap)
         profile = np.array([moment.state.gap, moment.state.pressure, solid_pressure, moment.state.saturation])
         for k in range(1, len(times)):
             share = k / len(times)
@@ -426,7 +425,7 @@ def _may_be_one_step(model: TransientModel, moment: TransientState, positions: l
     edge = model.case.control_edge
     if edge is None:
         return True
-    solid, _ = asperity_pressure(moment.state.gap, model.contact.asperities)
+    solid, _ = model.contact.asperity_pressure(moment.state.gap)
     load = moment.state.pressure + solid
     loaded = model.place[load > 0.01 * load.max()]
     places = moment.contact_place, positions[-1] - moment.lag

@@ -26,6 +26,7 @@ from scipy.optimize import nnls
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from harness.blow_by import blow_by
+from harness.section_stiffness import axial_stiffness
 
 from seal_friction_ros.core.lubrication.contact import dry_contact
 from seal_friction_ros.core.lubrication.grease import apparent_viscosity
@@ -67,7 +68,7 @@ def bodies(numerics: StudyNumerics) -> Rows:
         found = findings(run_transient(dataclasses.replace(case, seal=seal, numerics=meshed)))
         pulled = '-'
         if changes.get('body') == 'finite_elements':
-            pulled = face_compliance(seal_section(seal, numerics.film_width, mesh)).axial_stiffness
+            pulled = axial_stiffness(seal_section(seal, numerics.film_width, mesh))
         rows.append(
             {
                 'body': name,
@@ -204,7 +205,7 @@ def contact_forces(seal: StudySeal, elements: int, squeeze: float) -> tuple[floa
 
 def _of_small_displacements(seal: StudySeal, section: SealSection, squeeze: float) -> float:
     """No gap and no force of a node is negative, and one of them is zero: a least-squares problem of forces >= 0."""
-    root = np.linalg.cholesky(face_compliance(section).off_wall)
+    root = np.linalg.cholesky(face_compliance(section))
     gap = seal.fall(section.place) - squeeze
     return float(nnls(root.T, -np.linalg.solve(root, gap))[0].sum())
 

@@ -39,8 +39,8 @@ class Slid(NamedTuple):
 
 def seal_files(computed: MapRuns, folder: Path) -> dict[str, Path]:
     """Seal file of a map without speeds, as it is written for a ring, and with those of the film."""
-    open_rows = [row._replace(real_contact=0.0) for row in computed.rows]
-    files = {'film': computed._replace(rows=open_rows), 'none': computed}
+    free = computed.table._replace(real_contact=0.0 * computed.table.real_contact)
+    files = {'film': computed._replace(table=free), 'none': computed}
     for name, runs in files.items():
         document = seal_document(runs, name) | {'mounting': {'chambers': ['a']}}
         write_seal(document, folder / f'{name}.yaml', 'Seal file.')

@@ -20,13 +20,11 @@ import inspect
 from bisect import bisect_right
 from collections import namedtuple
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import cache, partial
 from pkgutil import resolve_name
 from types import FunctionType
 from typing import Any, NamedTuple, TypeVar, cast, get_type_hints
-
-from seal_friction_ros.core.foundation.compiler_hooks import hooks
 
 Function = TypeVar('Function', bound=Callable[..., Any])
 Record = TypeVar('Record')
@@ -40,13 +38,30 @@ NEW_RECORDS = 20_000
 The 700 of Python take a tenth more time; no collection at all takes 140 MB more.
 """
 
+
+class CompilerHooks(NamedTuple):
+    """What else happens when code is compiled, set by those who know files: see `seal_friction_ros.compiled_code`."""
+
+    before_loading: Callable[[], None]  # called before the compiler is loaded
+    alone_with: Callable[[str], AbstractContextManager[None]]
+    """gives the context in which the function of a name is compiled, and written to disk"""
+
+
+_hooks = [CompilerHooks(lambda: None, lambda _: nullcontext())]  # the one in use
+
+
+def set_hooks(hooks: CompilerHooks) -> None:
+    """Use ``hooks`` from now on."""
+    _hooks[:] = [hooks]
+
+
 _waiting: list[Callable[..., Any]] = []  # compilable functions that the compiler does not know yet
 
 
 @cache
 def has_compiler() -> bool:
     """Whether numba is installed; loads it."""
-    hooks().before_loading()
+    _hooks[0].before_loading()
     try:
         resolve_name('numba')
     except ModuleNotFoundError:
@@ -85,7 +100,7 @@ def compiled(function: Function) -> Function:
 def _compile_alone(made: Any, compile_function: Callable[[Any], Any], name: str, signature: Any) -> Any:
     """Compile, or load from disk, while no other process does. Without the disk if anything is wrong there."""
     try:
-        with hooks().alone_with(name), _seldom_collected():
+        with _hooks[0].alone_with(name), _seldom_collected():
             return compile_function(signature)
     except Exception:  # noqa: BLE001  of damaged files and full disks; what the compiler has to say comes again
         from numba.core.caching import NullCache
@@ -136,16 +151,10 @@ def before_compiling(tell: Callable[[], object]) -> Iterator[None]:
 
 def make_known() -> None:
     """Let compiled code call every function that was marked `compilable` up to now."""
-    from numba.extending import register_jitable
-
     _teach_the_compiler()
     while _waiting:
         function = _waiting.pop()
-        known = _with_unrolled_loops(function)
-        if known is function:
-            register_jitable(**INNER)(function)
-        else:
-            _stand_in(function, known)
+        _stand_in(function, _with_unrolled_loops(function))
 
 
 def unrolled(records: Any) -> Any:
@@ -266,9 +275,13 @@ def _names_of(kind: type) -> tuple[str, ...]:
 
 
 def _is_numeric(value: Any) -> bool:
-    """Whether compiled code has a place for it: a number, a function with bound parameters, none, or tuples of such."""
+    """Whether compiled code has a place for it: a number, a function with bound parameters, none, or tuples of such.
+
+    A named tuple may hold dataclasses.
+    """
     if isinstance(value, tuple):
-        return all(map(_is_numeric, value))
+        is_record = hasattr(value, '_fields')
+        return all(_is_numeric(each) or (is_record and dataclasses.is_dataclass(each)) for each in value)
     return value is None or isinstance(value, int | float | partial) or hasattr(value, 'dtype')
 
 

@@ -41,6 +41,13 @@ def meanings(record: Any) -> dict[str, Meaning]:
     return {f.name: f.metadata['meaning'] for f in dataclasses.fields(record) if 'meaning' in f.metadata}
 
 
+def within_bounds(record: Any, name: str, value: Any) -> Any:
+    """A number clamped to the bounds of the field of a dataclass or an instance."""
+    meaning = meanings(record)[name]
+    lower, upper = meaning.lower, meaning.upper
+    return min(max(value, value if lower is None else lower), value if upper is None else upper)
+
+
 class ParameterGroup(NamedTuple):
     """Parameters of a node that one dataclass declares."""
 

@@ -15,12 +15,7 @@ from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrect
 from seal_friction_ros.core.friction.identified_motion import ANY_MOTION, IdentifiedMotion
 from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
 from seal_friction_ros.core.friction.laws.law import FrictionLaw
-from seal_friction_ros.core.friction.laws.velocity_terms import (
-    NO_VELOCITY_TERMS,
-    VelocityTermNumbers,
-    VelocityTerms,
-    with_velocity_terms,
-)
+from seal_friction_ros.core.friction.laws.velocity_terms import NO_VELOCITY_TERMS, VelocityTerms, with_velocity_terms
 from seal_friction_ros.core.friction.mounting import CHAMBERS, CHAMBERS_TEXT, pressed_out, pressure_at_seal
 from seal_friction_ros.core.friction.presliding import Presliding
 from seal_friction_ros.core.friction.pressure_asymmetry import PressureAsymmetry
@@ -145,7 +140,7 @@ class SealNumbers(NamedTuple):
     law: Bound
     coulomb_speed: float  # [m/s] at which the Coulomb friction is taken
     law_depends_on_speed: bool
-    velocity_terms: VelocityTermNumbers = NO_VELOCITY_TERMS
+    velocity_terms: VelocityTerms = NO_VELOCITY_TERMS
     depends_on_velocity: bool = False  # whether the sliding friction differs from the Coulomb friction
     chamber: int = 0  # index in `CHAMBERS`
     scale: float = 1.0  # [-] factor on all friction of the seal
@@ -168,7 +163,7 @@ def numbers_of_law(law: FrictionLaw, terms: VelocityTerms | None = None) -> Seal
         law=law.bound,
         coulomb_speed=law.coulomb_speed,
         law_depends_on_speed=law.depends_on_speed,
-        velocity_terms=terms.numbers if terms else NO_VELOCITY_TERMS,
+        velocity_terms=terms or NO_VELOCITY_TERMS,
         depends_on_velocity=law.depends_on_speed or terms is not None,
     )
 
@@ -228,8 +223,7 @@ def sliding_friction(
     """
     if seal.law_depends_on_speed:
         return evaluate(seal.law, pressure, speed)
-    viscous, stribeck, stribeck_velocity, asymmetry = seal.velocity_terms
-    return with_velocity_terms(coulomb_friction, speed, direction, viscous, stribeck, stribeck_velocity, asymmetry)
+    return with_velocity_terms(seal.velocity_terms, coulomb_friction, speed, direction)
 
 
 @compilable

@@ -75,11 +75,6 @@ _OPTIONAL: dict[str, type] = {
 """Part of a seal that a file may have -> its record"""
 
 
-def friction_laws() -> dict[str, type[FrictionLaw]]:
-    """Every friction law by its name in a seal file."""
-    return {law.NAME: law for law in FRICTION_LAWS}
-
-
 def parse_seal(document: Any) -> Seal:
     """Make a seal from the document of a seal file.
 
@@ -87,7 +82,8 @@ def parse_seal(document: Any) -> Seal:
     """
     name, _ = name_and_source(document, 'seal')
     where = f'seal {name}'
-    law_type = friction_laws()[_choice(document, 'coulomb_law', friction_laws(), where)]
+    laws = {law.NAME: law for law in FRICTION_LAWS}
+    law_type = laws[_choice(document, 'coulomb_law', laws, where)]
     check_names(document, sorted(_COMMON | keys_of_law(law_type)), f'{where}: {law_type.NAME}')
     law = _friction_law(law_type, document, where)
     optional = {

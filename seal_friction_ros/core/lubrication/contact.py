@@ -8,8 +8,8 @@ Each cell has three unknowns: gap h, film pressure p and saturation theta. Three
 with the rigid gap g (negative where the seal overlaps the wall), the compliance K of the half-plane (`elasticity`) and
 the contact pressure p_c (`topography`). Newton's method solves all three together. Its linear system is dense through
 K, but the inverse of K decays as 1 / r^2: a banded approximation gives a banded system, which is solved directly and
-preconditions GMRES on the elastic equation, with K by fast Fourier transform. A step costs n log n, and the flow is
-balanced to rounding whatever the tolerance of the elastic equation.
+preconditions GMRES on the elastic equation. The flow is balanced to rounding whatever the tolerance of the elastic
+equation.
 
 Scheme and preconditioner are our choice; GMRES: Y. Saad, M. H. Schultz 1986.
 """
@@ -107,11 +107,10 @@ class LubricatedContact:
         t = self.topography
         return t.rms_height if t.shear_stress_factors else 0.0, shear_stress_coefficients(t.peklenik_number)
 
-    @property
-    def asperities(self) -> tuple[float, float, bool]:
-        """Arguments of `topography.contact_pressure` before the separation."""
+    def asperity_pressure(self, gap: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Contact pressure [Pa] and its derivative [Pa/m] in each cell at a ``gap`` [m]."""
         t = self.topography
-        return t.contact_stiffness(self.body.modulus), t.separation_length, t.filling
+        return contact_pressure(t.contact_stiffness(self.body.modulus), t.separation_length, t.filling, gap)
 
 
 @compiled
@@ -148,16 +147,6 @@ def film_properties(
         properties[2, i] = h + rms * asymmetry * shear
         properties[3, i] = inside * (1.0 + asymmetry * shear_slope)
     return properties
-
-
-@compiled
-def asperity_pressure(gap: FloatArray, asperities: tuple[float, float, bool]) -> tuple[FloatArray, FloatArray]:
-    """Contact pressure [Pa] and its derivative [Pa/m] in each cell."""
-    n = gap.shape[0]
-    pressure, slope = np.empty(n), np.empty(n)
-    for i in range(n):
-        pressure[i], slope[i] = contact_pressure(asperities[0], asperities[1], asperities[2], gap[i])
-    return pressure, slope
 
 
 @compiled
@@ -217,16 +206,11 @@ def _solve_band(band: FloatArray, elastic: FloatArray, flow: FloatArray) -> tupl
     return x[0::2].copy(), x[1::2].copy()
 
 
-@compiled
 def _flow_right_side(residual: FloatArray, rows: FloatArray, kept: FloatArray) -> FloatArray:
     """Right-hand side of the Reynolds rows once the complementarity is eliminated, shape (n,)."""
-    n = residual.shape[0]
-    right = np.empty(n)
-    for i in range(n):
-        total = -residual[i]
-        for j in range(max(0, i - 1), min(n, i + 2)):
-            total -= rows[0, j - i + 1, i] * kept[0, j] + rows[1, j - i + 1, i] * kept[2, j]
-        right[i] = total
+    known = np.pad(kept[::2], ((0, 0), (1, 1)))  # change of pressure and saturation; nothing beyond both ends
+    around = np.stack([known[:, k : k + len(residual)] for k in range(3)], axis=1)
+    right: FloatArray = -residual - (rows[:2] * around).sum(axis=(0, 1))
     return right
 
 
@@ -295,7 +279,7 @@ def contact_step(
             gap, pressure, saturation, properties, 0.5 * wall_velocity, rate, old_thickness, plane.cell_width, ends
         )
         kept, imperfection = complementarity(pressure, saturation, _PRESSURE_SCALE)
-        solid, slope = asperity_pressure(gap, contact.asperities)
+        solid, slope = contact.asperity_pressure(gap)
         elastic = gap - rigid_gap - compliance_factor * plane.deflection(pressure + solid)
         largest_flow = (
             _LEAST_FLOW + float(np.abs(flow).max()) + rate * plane.cell_width * float(np.abs(old_thickness).max())
@@ -329,11 +313,11 @@ def dry_contact(contact: LubricatedContact, rigid_gap: FloatArray, guess: FloatA
     NotConvergedError: Newton's method did not converge.
     """
     plane = contact.body
-    matrix = plane.matrix()
+    matrix = plane.matrix
     gap = np.array(rigid_gap if guess is None else guess)
     identity: Any = np.eye(plane.cells)
     for _iteration in range(_ITERATIONS):
-        solid, slope = asperity_pressure(gap, contact.asperities)
+        solid, slope = contact.asperity_pressure(gap)
         elastic = gap - rigid_gap - matrix @ solid
         if np.abs(elastic).max() <= _GAP_TOLERANCE:
             return gap

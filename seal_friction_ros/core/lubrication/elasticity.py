@@ -1,12 +1,9 @@
 """Deflection of the seal surface under pressure: a half-plane, or finite elements."""
 
 import math
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
-from scipy.fft import next_fast_len
 from scipy.linalg import toeplitz
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
@@ -15,85 +12,47 @@ _HALF_BAND = 6  # of the approximate inverse; 4 to 10 run alike
 
 
 @dataclass(frozen=True, eq=False)
-class ElasticBody(ABC):
-    """What the contact needs of the body under the film, on cells of one width."""
+class ElasticBody:
+    """What the contact needs of the body under the film, on cells of one width; `half_plane`, `condensed_body`."""
 
-    cells: int
     cell_width: float  # [m]
     modulus: float  # plane-strain modulus E* = E / (1 - nu^2) [Pa], of the asperities, too
+    matrix: FloatArray = field(repr=False)
+    """deflection of a cell by a pressure in another [m/Pa], shape (cells, cells)"""
     stiffness_band: FloatArray = field(init=False, repr=False)
     """banded approximate inverse of the matrix: stiffness against a cell r away [Pa/m], shape (7,)"""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, 'stiffness_band', _stiffness_band(self.cells, self.cell_width, self.modulus))
 
-    @abstractmethod
-    def matrix(self) -> FloatArray:
-        """Full influence matrix [m/Pa], shape (cells, cells)."""
+    @property
+    def cells(self) -> int:
+        """Number of cells."""
+        return len(self.matrix)
 
     def deflection(self, pressure: FloatArray) -> FloatArray:
         """Deflection [m] of each cell under ``pressure`` [Pa], shape (cells,)."""
-        deflected: FloatArray = self.matrix() @ pressure
+        deflected: FloatArray = self.matrix @ pressure
         return deflected
 
 
-@dataclass(frozen=True, eq=False)
-class HalfPlane(ElasticBody):
-    r"""Influence matrix of a half-plane on a uniform grid of cells, each with one pressure, rigid at a depth.
+def half_plane(cells: int, cell_width: float, modulus: float, depth: float) -> ElasticBody:
+    r"""A half-plane on a uniform grid of cells, each with one pressure, rigid at a depth.
 
     .. math:: u(x) = \frac{2}{\pi E^*} \int p(s) \ln\frac{d}{|x - s|}\,ds
 
     exact for a pressure that is constant in each cell. The deflection of a half-plane is unbounded, so a ``depth`` d
-    fixes where it is zero: about the height of the seal section (our choice).
+    [m] fixes where it is zero: about the height of the seal section (our choice). ValueError: there are fewer than 16
+    cells, or the film is wider than the depth.
 
     Source: K. L. Johnson, Contact Mechanics, 1985, section 2.3 and appendix.
     """
-
-    depth: float  # [m]
-    influence: FloatArray = field(init=False, repr=False)
-    """deflection of a cell by a unit pressure r cells away [m/Pa], shape (cells,)"""
-    _length: int = field(init=False, repr=False)
-    _spectrum: npt.NDArray[np.complex128] = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        if self.cells < 16:
-            raise ValueError(f'HalfPlane.cells = {self.cells} is too few: take 16 at least')
-        super().__post_init__()
-        influence = self._influence()
-        length = next_fast_len(2 * self.cells, real=True)
-        ring = np.zeros(length)  # first column of a circulant that holds the Toeplitz matrix
-        ring[: self.cells] = influence
-        ring[-self.cells + 1 :] = influence[:0:-1]
-        object.__setattr__(self, '_length', length)
-        object.__setattr__(self, 'influence', influence)
-        object.__setattr__(self, '_spectrum', np.fft.rfft(ring))
-
-    def _influence(self) -> FloatArray:
-        if self.depth < self.cells * self.cell_width:
-            raise ValueError(
-                f'HalfPlane.depth = {self.depth} m is less than the {self.cells * self.cell_width} m of the film'
-            )
-        return influence_of_cells(np.arange(self.cells), self.cell_width, self.modulus, self.depth)
-
-    def deflection(self, pressure: FloatArray) -> FloatArray:
-        """Deflection [m] of each cell under ``pressure`` [Pa], shape (cells,); n log n by fast Fourier transform."""
-        spectrum = np.fft.rfft(pressure, self._length) * self._spectrum
-        return np.asarray(np.fft.irfft(spectrum, self._length)[: self.cells])
-
-    def matrix(self) -> FloatArray:
-        """Full influence matrix [m/Pa], shape (cells, cells)."""
-        return np.asarray(toeplitz(self.influence))
-
-
-@dataclass(frozen=True, eq=False)
-class CondensedBody(ElasticBody):
-    """Finite-element body on the cells of a film; `condensed_body` makes it."""
-
-    compliance: FloatArray  # deflection of a cell by a pressure in another [m/Pa], shape (cells, cells)
-
-    def matrix(self) -> FloatArray:
-        """Full influence matrix [m/Pa], shape (cells, cells)."""
-        return self.compliance
+    if cells < 16:
+        raise ValueError(f'half_plane: cells = {cells} is too few: take 16 at least')
+    if depth < cells * cell_width:
+        raise ValueError(f'half_plane: depth = {depth} m is less than the {cells * cell_width} m of the film')
+    influence = influence_of_cells(np.arange(cells), cell_width, modulus, depth)
+    return ElasticBody(cell_width, modulus, np.asarray(toeplitz(influence)))
 
 
 def hat_functions(places: FloatArray, nodes: FloatArray) -> FloatArray:
@@ -103,7 +62,7 @@ def hat_functions(places: FloatArray, nodes: FloatArray) -> FloatArray:
 
 def condensed_body(
     places: FloatArray, nodes: FloatArray, compliance: FloatArray, modulus: float, circumference: float
-) -> CondensedBody:
+) -> ElasticBody:
     r"""Body on the cells of a film from the compliance of the nodes of its surface.
 
     .. math:: K = N C N^T + A - \Pi A \Pi,\quad \Pi = N (N^T N)^{-1} N^T
@@ -117,13 +76,13 @@ def condensed_body(
     """
     width = float(places[1] - places[0])
     hats = hat_functions(places, nodes)
-    deep = HalfPlane(len(places), width, modulus, 2.0 * len(places) * width).matrix()
+    deep = half_plane(len(places), width, modulus, 2.0 * len(places) * width).matrix
     seen = hats @ np.linalg.pinv(hats)  # what the nodes can follow
     coarse = circumference * width * hats @ compliance @ hats.T
     whole = coarse + deep - seen @ deep @ seen
     values, shapes = np.linalg.eigh(0.5 * (whole + whole.T))
     least = float(np.linalg.eigvalsh(deep)[0])
-    return CondensedBody(len(places), width, modulus, (shapes * np.maximum(values, least)) @ shapes.T)
+    return ElasticBody(width, modulus, (shapes * np.maximum(values, least)) @ shapes.T)
 
 
 def influence_of_cells(distance: FloatArray | IntArray, width: float, modulus: float, depth: float) -> FloatArray:

@@ -2,8 +2,8 @@
 
 import dataclasses
 import math
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.integrate import trapezoid
@@ -18,10 +18,10 @@ from seal_friction_ros.core.lubrication.model import (
     film_at_rest,
     fluid_force,
     profile_model,
+    real_area_share,
     solid_limit,
 )
 from seal_friction_ros.core.lubrication.oring_film import oring_film, oring_films
-from seal_friction_ros.core.lubrication.shear import real_area_share
 from seal_friction_ros.core.oring_contact.ring_friction import DISCRETISATION
 
 _PASSAGES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0, 100.0, math.inf)  # steps to the steady film
@@ -36,16 +36,21 @@ THINNEST_OF_CLOSURES = 0.5  # [-] gap over rms roughness from which the flow fac
 
 
 class SteadyFriction(NamedTuple):
-    """Steady sliding friction at one pressure, over the speeds of the grid."""
+    """Steady sliding friction at one pressure, over n speeds; at several pressures each field has one more axis."""
 
-    pressure: float  # [Pa, gauge] on one side
-    friction: FloatArray  # [N] mean of both directions
-    solid: FloatArray  # [N] mean of both directions
-    direction_difference: FloatArray  # [N] friction towards the pressure less that away from it
-    stiffness: float  # [N/m] of seal and groove against axial motion of the contact
-    retried_steps: int
-    real_contact: float = 0.0  # [-] largest share of the seal that touches, at rest
-    thinnest: float = math.inf  # [-] smallest gap over the rms roughness, at rest
+    pressure: Any  # [Pa, gauge] on one side
+    friction: FloatArray  # [N] mean of both directions, shape (n,)
+    solid: FloatArray  # [N] mean of both directions, shape (n,)
+    direction_difference: FloatArray  # [N] friction towards the pressure less that away from it, shape (n,)
+    stiffness: Any  # [N/m] of seal and groove against axial motion of the contact
+    retried_steps: Any
+    real_contact: Any = 0.0  # [-] largest share of the seal that touches, at rest
+    thinnest: Any = math.inf  # [-] smallest gap over the rms roughness, at rest
+
+
+def stacked(rows: Iterable[SteadyFriction]) -> SteadyFriction:
+    """Rows at several pressures as one record, each field over the pressures."""
+    return SteadyFriction(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
 class MemoryLength(NamedTuple):
@@ -128,13 +133,13 @@ def steady_friction(case: LubricationCase, pressure: float) -> SteadyFriction:
     return _steady(case, pressure, _at_rest(case, pressure))
 
 
-def steady_rows(case: LubricationCase) -> list[SteadyFriction]:
-    """`steady_friction` at each pressure of the grid; an O-ring is loaded once, from pressure to pressure."""
+def steady_table(case: LubricationCase) -> SteadyFriction:
+    """`steady_friction` at the pressures of the grid; an O-ring is loaded once, from pressure to pressure."""
     pressures = tuple(map_pressures(case.map).tolist())
     if case.oring is None:
-        return [steady_friction(case, pressure) for pressure in pressures]
+        return stacked(steady_friction(case, pressure) for pressure in pressures)
     films = oring_films(case, case.oring, pressures)
-    return [_steady(case, pressure, film) for pressure, film in zip(pressures, films, strict=True)]
+    return stacked(_steady(case, pressure, film) for pressure, film in zip(pressures, films, strict=True))
 
 
 def _steady(
@@ -179,33 +184,32 @@ def memory_length(case: LubricationCase) -> MemoryLength:
     return MemoryLength(float(trapezoid(over) * step * fast), first + second + third)
 
 
-def friction_map(case: LubricationCase, rows: list[SteadyFriction], memory: float) -> FrictionMap:
-    """The law from its computed rows, one for each pressure of the grid, in any order.
+def friction_map(case: LubricationCase, table: SteadyFriction, memory: float) -> FrictionMap:
+    """The law from its table, of each pressure of the grid, in any order.
 
     The presliding length is friction over stiffness at 0 Pa. An O-ring that no pressure holds on its wall rolls, so its
-    length is that of the next pressure (our choice). ValueError: the rows are not those of the grid.
+    length is that of the next pressure (our choice). ValueError: the pressures are not those of the grid.
     """
-    ordered = sorted(rows, key=lambda row: row.pressure)
-    pressures = map_pressures(case.map)
-    if len(ordered) != len(pressures) or not np.allclose([row.pressure for row in ordered], pressures):
+    order, pressures = np.argsort(table.pressure), map_pressures(case.map)
+    if len(order) != len(pressures) or not np.allclose(table.pressure[order], pressures):
         raise ValueError('friction_map: the rows are not those of the pressures of the grid')
-    held = ordered[1 if case.oring else 0]
+    held = order[1 if case.oring else 0]
     return FrictionMap(
         speeds=tuple(map_speeds(case.map).tolist()),
         pressures=tuple(pressures.tolist()),
-        frictions=tuple(float(value) for row in ordered for value in row.friction),
+        frictions=tuple(table.friction[order].ravel().tolist()),
         reference_speed=case.motion.speed,
         memory_length=memory,
-        presliding_length=float(held.friction[0]) / float(held.stiffness),
+        presliding_length=float(table.friction[held, 0] / table.stiffness[held]),
     )
 
 
-def carries_film(rows: Sequence[SteadyFriction]) -> bool:
+def carries_film(table: SteadyFriction) -> bool:
     """Whether lubricant gets under the seal at every pressure: no real contact at rest is above `PERCOLATION`."""
-    return max(row.real_contact for row in rows) <= PERCOLATION
+    return bool(table.real_contact.max() <= PERCOLATION)
 
 
-def live_map(law: FrictionMap, rows: Sequence[SteadyFriction]) -> FrictionMap:
+def live_map(law: FrictionMap, table: SteadyFriction) -> FrictionMap:
     """The map that a seal file has: without the speeds where the contact carries no film.
 
     There the film that the model computes has no way in, and the change with speed that follows from it is refuted:
@@ -213,7 +217,7 @@ def live_map(law: FrictionMap, rows: Sequence[SteadyFriction]) -> FrictionMap:
     Where the friction at the reference speed falls from one pressure to the next by less than `DISCRETISATION`, the
     row is raised to the one before: rubber under more pressure does not rub less.
     """
-    if carries_film(rows):
+    if carries_film(table):
         return dataclasses.replace(law, frictions=_levelled(law))
     at_reference = tuple(law.coulomb_friction(pressure) for pressure in law.pressures)
     law = dataclasses.replace(
@@ -226,22 +230,24 @@ def live_map(law: FrictionMap, rows: Sequence[SteadyFriction]) -> FrictionMap:
     return dataclasses.replace(law, frictions=_levelled(law))
 
 
-def pressure_asymmetry(law: FrictionMap, rows: Sequence[SteadyFriction]) -> float:
+def pressure_asymmetry(law: FrictionMap, table: SteadyFriction) -> float:
     """Share by which the friction is larger towards the highest pressure than the mean [-], and smaller away from it.
 
     Half the difference of the directions over their sum at the reference speed grows with the pressure; the share is
     that at the highest pressure of the line through 0 that fits it best (least squares).
     """
-    loaded = np.array([row.pressure for row in rows]) / law.pressures[-1]
-    shares = [directions(row, law.reference_speed, law.speeds) for row in rows]
-    uneven = np.array([0.5 * (towards - away) / (0.5 * (towards + away)) for towards, away in shares])
+    loaded = table.pressure / law.pressures[-1]
+    towards, away = directions(law, table)
+    uneven = (towards - away) / (towards + away)
     return float(uneven @ loaded / (loaded @ loaded))
 
 
-def directions(row: SteadyFriction, speed: float, speeds: Sequence[float]) -> tuple[float, float]:
-    """Friction [N] towards the pressure and away from it at a ``speed`` [m/s], ``speeds`` being those of the row."""
-    mean, difference = (np.interp(math.log(speed), np.log(speeds), v) for v in (row.friction, row.direction_difference))
-    return float(mean + 0.5 * difference), float(mean - 0.5 * difference)
+def directions(law: FrictionMap, table: SteadyFriction) -> FloatArray:
+    """Friction [N] towards the pressure and away from it at the reference speed, shape (2, pressures)."""
+    speed, speeds = math.log(law.reference_speed), np.log(law.speeds)
+    columns = (table.friction, table.direction_difference)
+    mean, difference = (np.array([np.interp(speed, speeds, row) for row in column]) for column in columns)
+    return np.array([mean + 0.5 * difference, mean - 0.5 * difference])
 
 
 def _levelled(law: FrictionMap) -> tuple[float, ...]:

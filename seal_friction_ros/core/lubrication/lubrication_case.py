@@ -27,8 +27,7 @@ from seal_friction_ros.core.foundation.parameters import (
 from seal_friction_ros.core.foundation.unknowns import Unknown, parse_unknowns
 from seal_friction_ros.core.lubrication.elasticity import ElasticBody
 from seal_friction_ros.core.lubrication.grease import Grease
-from seal_friction_ros.core.lubrication.seal_profile import LubricationNumerics, SealBody
-from seal_friction_ros.core.lubrication.seal_section import seal_body
+from seal_friction_ros.core.lubrication.seal_section import LubricationNumerics, SealBody, seal_body
 from seal_friction_ros.core.lubrication.topography import Topography
 from seal_friction_ros.core.oring_contact.oring_case import OringCase
 from seal_friction_ros.core.oring_contact.oring_case_file import FRICTION_COEFFICIENT, OringCaseFile, varied_ring

@@ -86,7 +86,7 @@ def _film(case: LubricationCase, oring: OringCase, elements: OringModel, loaded:
     profile = unpressed - body.deflection(np.interp(place, (begin, end), at_ends))
     model = LubricationModel(case, contact, place, ambient, profile, circumference, pressure, 0.0)
     solid = np.maximum(dry_pressure - ambient, _LEAST_PRESSURE * modulus)
-    stiffness, length, _ = contact.asperities
+    length, stiffness = case.topography.separation_length, case.topography.contact_stiffness(modulus)
     guess = np.maximum(np.interp(place, face.place, face.gap), 0.0) + length * np.log1p(stiffness / solid)
     gap = dry_contact(contact, model.profile + body.deflection(ambient), guess)
     return OringFilm(model, ContactState(gap, ambient, np.ones(cells)), face.axial_stiffness)

@@ -3,7 +3,9 @@
 import math
 from dataclasses import dataclass
 
-from seal_friction_ros.core.foundation.compiled import compiled
+import numpy as np
+
+from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.lubrication.flow_factors import flow_factor_coefficients
 
@@ -86,12 +88,12 @@ class Topography(CheckedParameters):
         return modulus * self.rms_slope / math.sqrt(2.0)
 
 
-@compiled
-def contact_pressure(stiffness: float, length: float, filling: bool, separation: float) -> tuple[float, float]:
+def contact_pressure(
+    stiffness: float, length: float, filling: bool, separation: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Pressure p_c [Pa] of the asperities and its derivative [Pa/m] at a mean ``separation`` [m]; see `Topography`."""
-    least = _LEAST_SHARE if filling else 0.0
-    ratio = max(separation / length, least)
-    less = 1.0 if filling else 0.0
-    share = 1.0 / (math.exp(ratio) - less) if ratio < _FURTHEST else 0.0
+    least, less = (_LEAST_SHARE, 1.0) if filling else (0.0, 0.0)
+    ratio = np.clip(separation / length, least, _FURTHEST)
+    share = np.where(ratio < _FURTHEST, 1.0 / (np.exp(ratio) - less), 0.0)
     slope = -stiffness * share * (1.0 + less * share) / length
-    return stiffness * share + slope * min(separation - least * length, 0.0), slope
+    return stiffness * share + slope * np.minimum(separation - least * length, 0.0), slope

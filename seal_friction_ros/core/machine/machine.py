@@ -79,16 +79,8 @@ class Wiring(NamedTuple):
     force: tuple[int, ...]
     reference: int  # that makes a reference; -1: there is none
     velocity: int  # that makes a velocity: itself or the position
-
-    @property
-    def forces(self) -> int:
-        """What pressure and force sum are made of, as bits."""
-        return sum(1 << quantity for quantity in {*self.pressure, *self.force})
-
-    @property
-    def motions(self) -> int:
-        """What position, reference and velocity are made of, as bits."""
-        return sum(1 << quantity for quantity in {_POSITION, self.reference, self.velocity} if quantity >= 0)
+    forces: int  # what pressure and force sum are made of, as bits
+    motions: int  # what position, reference and velocity are made of, as bits
 
 
 @dataclass(frozen=True)
@@ -101,8 +93,6 @@ class MachineActuator:
     absolute: frozenset[int]  # pressures from which the ambient pressure is taken off
     configuration: Configuration
     pipeline: PipelineParameters
-    forces: int  # of the wiring
-    motions: int
 
     @property
     def name(self) -> str:
@@ -220,8 +210,7 @@ def _actuator(mapping: Actuator, file: MachineFile, configuration: Configuration
     signals = mapping.signals()
     absolute = frozenset(_PLACE[name] for name, signal in signals.items() if signal.absolute)
     wiring, parameters = _wiring(mapping, signals), configuration.parameters()
-    masks = wiring.forces, wiring.motions
-    return MachineActuator(mapping, wiring, tuple(constants), absolute, configuration, parameters, *masks)
+    return MachineActuator(mapping, wiring, tuple(constants), absolute, configuration, parameters)
 
 
 def _wiring(mapping: Actuator, signals: Mapping[str, Signal]) -> Wiring:
@@ -236,7 +225,9 @@ def _wiring(mapping: Actuator, signals: Mapping[str, Signal]) -> Wiring:
             force.add(_POSITION)
     reference = next((_PLACE[name] for name in ('reference_velocity', 'reference_position') if name in signals), -1)
     velocity = _PLACE['velocity' if 'velocity' in signals else 'position']
-    return Wiring(pressure, tuple(sorted(force)), reference, velocity)
+    forces, motions = {*pressure, *force}, {_POSITION, reference, velocity} - {-1}
+    bits = (sum(1 << quantity for quantity in quantities) for quantities in (forces, motions))
+    return Wiring(pressure, tuple(sorted(force)), reference, velocity, *bits)
 
 
 def _with_load(configuration: Configuration) -> Configuration:
@@ -396,9 +387,9 @@ def records_of(
     records: list[Input] = []
     if changed >> _TEMPERATURE & 1:
         records.append(Temperature(stamp, values[_TEMPERATURE] - ZERO_CELSIUS))
-    if changed & actuator.forces:
+    if changed & actuator.wiring.forces:
         pressure_stamp, force_stamp = _add_forces(actuator, values, stamps, pressure_stamp, force_stamp, records)
-    if changed & actuator.motions:
+    if changed & actuator.wiring.motions:
         windows = window, reference_window
         window, reference_window = _add_motion(actuator, values, windows, changed, stamp, frame_id, records)
     return Memory(tuple(values), tuple(stamps), pressure_stamp, force_stamp, window, reference_window), records

@@ -255,13 +255,10 @@ def parse_machine(document: Any, where: str) -> MachineFile:
     return MachineFile(name, topics, ambient, actuators, answers == ANSWERS[1], document)
 
 
-def own_file(selection: SealSelection, topics: Mapping[str, str] = OWN_TOPICS) -> MachineFile:
-    """The built-in mapping: one actuator without a name, whose messages are the records of this project.
-
-    ``topics``: topic -> message type; a message of another project cannot be mapped.
-    """
+def own_file(selection: SealSelection) -> MachineFile:
+    """The built-in mapping: one actuator without a name, whose messages are the records of this project."""
     settings = EstimatorSettings(), FeedForwardSettings(), AdaptationSettings()
-    return MachineFile('', topics, 0.0, (Actuator('', selection, {}, 0.0, 0.0, None, None, None, *settings),))
+    return MachineFile('', OWN_TOPICS, 0.0, (Actuator('', selection, {}, 0.0, 0.0, None, None, None, *settings),))
 
 
 def check_mapping(document: Any, where: str) -> None:

@@ -1,5 +1,6 @@
-"""Equilibrium of the ring by Newton's method with a sparse stiffness and a direct solver."""
+"""Equilibrium of the ring by Newton's method with a sparse stiffness and a direct solver; paths of equilibria."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -81,11 +82,9 @@ def make_model(
     )
 
 
-def unstressed_state(model: OringModel, displacement: FloatArray | None = None) -> OringState:
-    """State without tension; ``displacement`` [m], shape (2 n,), is zero by default."""
-    if displacement is None:
-        displacement = np.zeros(model.mesh.nodes.size)
-    return OringState(displacement, np.zeros(len(model.mesh.elements)))
+def unstressed_state(model: OringModel) -> OringState:
+    """State without displacement and tension."""
+    return OringState(np.zeros(model.mesh.nodes.size), np.zeros(len(model.mesh.elements)))
 
 
 def outline(model: OringModel, state: OringState) -> FloatArray:
@@ -185,3 +184,62 @@ def _take_newton_step(
             return trial, after
         length /= 2.0
     raise NotConvergedError('a Newton step inverts an element')
+
+
+_EASY = 6  # Newton steps; a step with no more is an easy one
+_GROW, _SHRINK = 1.6, 0.5
+_SMALLEST = 1e-4  # of the path
+
+
+class PathEnd(NamedTuple):
+    """Equilibrium at the end of a path."""
+
+    state: OringState
+    surroundings: Surroundings
+    newton_steps: int  # without those of failed steps
+    stride: float  # fraction of the path proposed for a next step
+
+
+def follow_path(
+    model: OringModel,
+    assembly: Assembly,
+    path: Callable[[float, OringState, float], Surroundings],
+    start: OringState,
+    stride: float = 1.0,
+    guess: Callable[[OringState, float, float], OringState] | None = None,
+) -> PathEnd:
+    """Follow the equilibrium along a path of surroundings, in steps that grow after easy ones and shrink after failed.
+
+    ``path`` gives the surroundings at a fraction of the path, 0 to 1, the last equilibrium, from ``start`` at 0, and
+    its fraction; the first step is the fraction ``stride``. ``guess`` gives the start of Newton's method from the last
+    equilibrium, its fraction and the next one, by default the linear extrapolation of the last two equilibria.
+    NotConvergedError: a step fails at the smallest size; the message has the fraction reached.
+    """
+    done, state, before, total = 0.0, start, (0.0, start), 0
+    surroundings = path(0.0, start, 0.0)
+    while done < 1.0:
+        wanted = done + stride
+        wanted = 1.0 if wanted > 1.0 - 0.1 * stride else wanted
+        first = guess(state, done, wanted) if guess else _extrapolated(before, (done, state), wanted)
+        next_surroundings = path(wanted, state, done)
+        try:
+            after, steps = solve_equilibrium(model, assembly, next_surroundings, first)
+        except NotConvergedError as error:
+            stride = _SHRINK * (wanted - done)
+            if stride < _SMALLEST:
+                raise NotConvergedError(f'at {100.0 * done:.3g} % of the path: {error}') from None
+            before = done, state  # start the retry from the last equilibrium
+            continue
+        if steps <= _EASY:
+            stride = max(stride, _GROW * (wanted - done))
+        before, done, state = (done, state), wanted, after
+        surroundings, total = next_surroundings, total + steps
+    return PathEnd(state, surroundings, total, stride)
+
+
+def _extrapolated(before: tuple[float, OringState], now: tuple[float, OringState], wanted: float) -> OringState:
+    if before[0] >= now[0]:
+        return now[1]
+    ratio = (wanted - now[0]) / (now[0] - before[0])
+    change = now[1].displacement - before[1].displacement
+    return now[1]._replace(displacement=now[1].displacement + ratio * change)

@@ -10,11 +10,11 @@ import numpy as np
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.foundation.errors import NotConvergedError, named_errors
 from seal_friction_ros.core.friction.geometry import projected_area
-from seal_friction_ros.core.oring_contact.continuation import follow_path
 from seal_friction_ros.core.oring_contact.equilibrium import (
     Assembly,
     OringModel,
     OringState,
+    follow_path,
     make_assembly,
     make_model,
     outline,

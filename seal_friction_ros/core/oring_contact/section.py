@@ -64,8 +64,7 @@ def checked_outline(points: FloatArray, name: str) -> FloatArray:
 
 def signed_area(points: FloatArray) -> float:
     """Area of a polygon, positive if its corners are counterclockwise."""
-    after = np.roll(points, -1, axis=0)
-    return float(0.5 * (points[:, 0] * after[:, 1] - after[:, 0] * points[:, 1]).sum())
+    return float(0.5 * cross(points, np.roll(points, -1, axis=0)).sum())
 
 
 def first_crossing(points: FloatArray) -> tuple[float, float] | None:
@@ -75,9 +74,9 @@ def first_crossing(points: FloatArray) -> tuple[float, float] | None:
     for i in range(count - 2):
         others = np.arange(i + 2, count if i else count - 1)
         between = start[others] - start[i]
-        turn = _cross(along[i], along[others])
+        turn = cross(along[i], along[others])
         with np.errstate(divide='ignore', invalid='ignore'):
-            here, there = _cross(between, along[others]) / turn, _cross(between, along[i]) / turn
+            here, there = cross(between, along[others]) / turn, cross(between, along[i]) / turn
         met = (here >= 0.0) & (here <= 1.0) & (there >= 0.0) & (there <= 1.0)
         if met.any():
             r, z = start[i] + here[met][0] * along[i]
@@ -85,9 +84,17 @@ def first_crossing(points: FloatArray) -> tuple[float, float] | None:
     return None
 
 
-def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+def cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross product of vectors of the plane, shape (..., 2) each."""
     crossed: FloatArray = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
     return crossed
+
+
+def turns_of(polygon: FloatArray) -> FloatArray:
+    """Turn of the outline at each corner [rad], shape (n,)."""
+    before, after = polygon - np.roll(polygon, 1, axis=0), np.roll(polygon, -1, axis=0) - polygon
+    turn: FloatArray = np.arctan2(cross(before, after), (before * after).sum(axis=1))
+    return turn
 
 
 def placed(section: Section, inner_diameter: float, height: float | None = None) -> Section:
@@ -116,10 +123,9 @@ def rounded(section: Section, radius: float, *, outside: bool) -> Section:
     def with_arcs(polygon: FloatArray) -> FloatArray:
         """Polygon of shape (n, 2) with an arc for each corner near the wall."""
         before, after = polygon - np.roll(polygon, 1, axis=0), np.roll(polygon, -1, axis=0) - polygon
-        turns = np.arctan2(_cross(before, after), (before * after).sum(axis=1))
         near = (high - polygon[:, 0] if outside else polygon[:, 0] - low) < NEAR_WALL * (high - low)
         points = []
-        for corner, back, on, turn, faces in zip(polygon, before, after, turns, near, strict=True):
+        for corner, back, on, turn, faces in zip(polygon, before, after, turns_of(polygon), near, strict=True):
             if not faces or turn < CORNER:
                 points.append(corner[None])
                 continue

@@ -11,7 +11,7 @@ from scipy.spatial.distance import cdist
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.oring_contact.mesh import Mesh
-from seal_friction_ros.core.oring_contact.section import CORNER, NEAR_WALL, Section
+from seal_friction_ros.core.oring_contact.section import CORNER, NEAR_WALL, Section, cross, turns_of
 
 _GROWTH = 0.35  # of the edges per distance from the outline (our choice)
 _COARSE = 2.0  # edges of the outline that face no wall, over those that do (our choice)
@@ -57,8 +57,7 @@ def _points_along(section: Section, edge: float, across: float) -> tuple[FloatAr
     """Nodes along the outline, the middles after each, and the wanted edge at the nodes."""
     dense = _subdivided(section.outline, 0.25 * edge)
     sizes = _wanted_sizes(dense, section, edge, across)
-    turn = np.abs(_turns(section.outline))
-    corners = section.outline[turn > CORNER]
+    corners = section.outline[np.abs(turns_of(section.outline)) > CORNER]
     if section.cap is not None:
         corners = np.concatenate((corners, section.cap[[0, -1]]))
     if len(corners) < 2:
@@ -90,18 +89,10 @@ def _subdivided(polygon: FloatArray, step: float) -> FloatArray:
     return points
 
 
-def _turns(polygon: FloatArray) -> FloatArray:
-    """Turn of the outline at each corner [rad]."""
-    before, after = polygon - np.roll(polygon, 1, axis=0), np.roll(polygon, -1, axis=0) - polygon
-    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    turn: FloatArray = np.arctan2(cross, (before * after).sum(axis=1))
-    return turn
-
-
 def _rounded_corners(polygon: FloatArray, sharpest: float) -> tuple[FloatArray, FloatArray]:
     """Points of arcs of a radius below ``sharpest``, shape (n, 2), and their radii, shape (n,)."""
     length = np.linalg.norm(np.roll(polygon, -1, axis=0) - polygon, axis=1)
-    turns = np.abs(_turns(polygon))
+    turns = np.abs(turns_of(polygon))
     radii = np.minimum(length, np.roll(length, 1)) / np.maximum(turns, 1e-9)
     arc = (turns < CORNER) & (radii < sharpest)
     return polygon[arc], radii[arc]
@@ -126,10 +117,9 @@ def _thickness(dense: FloatArray, polygon: FloatArray) -> FloatArray:
     inward = np.stack((-tangent[:, 1], tangent[:, 0]), axis=1) / np.linalg.norm(tangent, axis=1)[:, None]
     along = np.roll(polygon, -1, axis=0) - polygon
     between = polygon[None] - dense[:, None]
-    turn = inward[:, None, 0] * along[None, :, 1] - inward[:, None, 1] * along[None, :, 0]
+    turn = cross(inward[:, None], along)
     with np.errstate(divide='ignore', invalid='ignore'):
-        far = (between[..., 0] * along[None, :, 1] - between[..., 1] * along[None, :, 0]) / turn
-        at = (between[..., 0] * inward[:, None, 1] - between[..., 1] * inward[:, None, 0]) / turn
+        far, at = cross(between, along) / turn, cross(between, inward[:, None]) / turn
     far[~((far > 1e-3 * np.ptp(polygon, axis=0).max()) & (at >= 0.0) & (at <= 1.0))] = np.inf
     chord: FloatArray = far.min(axis=1)
     return chord
@@ -164,17 +154,8 @@ def _triangles(points: FloatArray, outline: FloatArray) -> IntArray:
     corners: IntArray = np.asarray(Delaunay(points).simplices, dtype=int)
     size = float(np.ptp(outline, axis=0).max())
     corners = corners[inside(points[corners].mean(axis=1), outline)]
-    area = _doubled_areas(points, corners)
-    corners = corners[np.abs(area) > 1e-9 * size**2]
-    area = _doubled_areas(points, corners)
-    corners[area < 0.0] = corners[area < 0.0][:, ::-1]
-    return corners
-
-
-def _doubled_areas(points: FloatArray, corners: IntArray) -> FloatArray:
-    a, b = points[corners[:, 1]] - points[corners[:, 0]], points[corners[:, 2]] - points[corners[:, 0]]
-    doubled: FloatArray = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    return doubled
+    a, b, c = points[corners.T]
+    return corners[cross(b - a, c - a) > 1e-9 * size**2]
 
 
 def _new_points(
@@ -183,7 +164,7 @@ def _new_points(
     """Centres of the circles around triangles that are larger than wanted, no two close to each other."""
     p = points[triangles]
     a, b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-    doubled = 2.0 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    doubled = 2.0 * cross(a, b)
     aa, bb = (a**2).sum(axis=1), (b**2).sum(axis=1)
     offset = np.stack((b[:, 1] * aa - a[:, 1] * bb, a[:, 0] * bb - b[:, 0] * aa), axis=1) / doubled[:, None]
     center, radius = p[:, 0] + offset, np.linalg.norm(offset, axis=1)

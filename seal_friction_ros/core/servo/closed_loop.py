@@ -113,7 +113,7 @@ def run_closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: F
         nonlocal newest
         newest = record if isinstance(record, records.FeedForward) else newest
 
-    rows = []
+    measured, rows = None, []
     for i in range(samples):
         stamp = round(i * period * 1e9)
         setpoint = wave.at(i * period)
@@ -134,9 +134,7 @@ def run_closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: F
         force = (1.0 - part) * forces[-1 - back] + part * forces[-2 - back]
         if sensors.encoder_step:
             measured = Measurement(counts[-1], velocity, *pressures)
-            state, out = servo.step_measured(plant, state, measured, setpoint, force)
-        else:
-            state, out = servo.step(plant, state, setpoint, force)
+        state, out = servo.step(plant, state, setpoint, force, measured=measured)
         end = (i + 1) * period
         rows.append((end, wave.at(end).position, out.position, out.velocity, out.friction_force, force))
     return AxisRun(*np.array(rows).T)

@@ -1,8 +1,7 @@
 """Position servo with seal friction.
 
 ``state = init(parameters)``, then ``state, outputs = step(parameters, state, reference, feedforward)``: one sample of
-the controller, over which valve, cylinder and load advance in inner steps. `step_measured` takes what the
-sensors of the controller say; `advance` is for a rig without controller.
+the controller, over which valve, cylinder and load advance in inner steps. `advance` is for a rig without controller.
 """
 
 import math
@@ -16,7 +15,7 @@ from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.compiled import compilable, compiled, keep
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.friction.actuator import MountedSeal, breakaway_in, friction_of_seals
-from seal_friction_ros.core.friction.states import StateFriction, sign, state_friction
+from seal_friction_ros.core.friction.states import sign, state_friction
 from seal_friction_ros.core.servo.controller import (
     Command,
     ControllerState,
@@ -185,17 +184,12 @@ def measure(cylinder: Cylinder, state: PlantState) -> Measurement:
     return Measurement(state.position, state.velocity, pressure_a, pressure_b)
 
 
-@compilable
-def _with_elastic_seals(elastic: Any, shear: SealShear, rigid: StateFriction) -> StateFriction:
-    """Friction that acts: of elastic seals the force of their shear, else that of rigid ones."""
-    if elastic is None:
-        return rigid
-    return StateFriction(rigid.state, rigid.direction, shear.friction)
-
-
 @compiled
 def _outputs(kept: Any, plant: PlantState, shear: SealShear, command: Command, load_force: float) -> ServoOutputs:
-    """Outputs in a state of the plant; friction by `state_friction` of the estimator, at rest where V = 0 exactly."""
+    """Outputs in a state of the plant; friction by `state_friction` of the estimator, at rest where V = 0 exactly.
+
+    The friction of elastic seals is the force of their shear.
+    """
     c, _gains, _time, _steps, elastic = kept.value
     a, b = chamber_pressures(c.cylinder, plant[:10])
     force = force_sum(c.cylinder, c.load, plant[:10], load_force)
@@ -205,9 +199,9 @@ def _outputs(kept: Any, plant: PlantState, shear: SealShear, command: Command, l
     ahead = sign(plant.velocity if plant.velocity != 0.0 else force)
     breakaway = breakaway_in(seals, ahead, with_stiction=True)
     acting = state_friction(plant.velocity, force, plant.velocity == 0.0, sliding, breakaway)
-    acting = _with_elastic_seals(elastic, shear, acting)
+    friction = acting.friction_force if elastic is None else shear.friction
     measured = (plant.position, plant.velocity, a, b, plant.spool, force)
-    return ServoOutputs(*measured, acting.friction_force, coulomb, breakaway, acting.state, acting.direction, command)
+    return ServoOutputs(*measured, friction, coulomb, breakaway, acting.state, acting.direction, command)
 
 
 def outputs(
@@ -217,8 +211,8 @@ def outputs(
     return _outputs(parameters.kept, plant, NO_SHEAR, command, load_force)
 
 
-@compilable
-def _controlled(
+@compiled
+def _step(
     kept: Any, state: ServoState, measured: Measurement, reference: Setpoint, feedforward: float, load_force: float
 ) -> tuple[ServoState, ServoOutputs]:
     c, g, _time, _steps, _elastic = kept.value
@@ -227,42 +221,22 @@ def _controlled(
     return ServoState(plant, controller, shear), _outputs(kept, plant, shear, command, load_force)
 
 
-@compiled
-def _step_measured(
-    kept: Any, state: ServoState, measured: Measurement, reference: Setpoint, feedforward: float
-) -> tuple[ServoState, ServoOutputs]:
-    return _controlled(kept, state, measured, reference, feedforward, 0.0)
-
-
-@compiled
-def _step(
-    kept: Any, state: ServoState, reference: Setpoint, feedforward: float, load_force: float
-) -> tuple[ServoState, ServoOutputs]:
-    measured = measure(kept.value[0].cylinder, state.plant)
-    return _controlled(kept, state, measured, reference, feedforward, load_force)
-
-
 def step(
     parameters: ServoParameters,
     state: ServoState,
     reference: Setpoint,
     feedforward: float = 0.0,
     load_force: float = 0.0,
+    measured: Measurement | None = None,
 ) -> tuple[ServoState, ServoOutputs]:
-    """One sample: the controller measures the rod without error, then the plant advances to the next sample.
+    """One sample: the controller acts, then the plant advances to the next sample.
 
     The state is from `init` or the previous step. An invalid reference or ``feedforward`` [N], positive on extension,
     is limited and flagged in ``outputs.command.limited``. The ``load_force`` from outside on the rod [N], positive on
-    extension, is constant over the step.
+    extension, is constant over the step. The controller has what its sensors ``measured``; None: the truth.
     """
-    return _step(parameters.kept, state, reference, feedforward, load_force)
-
-
-def step_measured(
-    parameters: ServoParameters, state: ServoState, measured: Measurement, reference: Setpoint, feedforward: float = 0.0
-) -> tuple[ServoState, ServoOutputs]:
-    """As `step`, but the controller has the measurement of real sensors."""
-    return _step_measured(parameters.kept, state, measured, reference, feedforward)
+    seen = measured or measure(parameters.cylinder, state.plant)
+    return _step(parameters.kept, state, seen, reference, feedforward, load_force)
 
 
 class Trajectory(NamedTuple):
@@ -284,7 +258,8 @@ class Trajectory(NamedTuple):
 def _simulate(kept: Any, state: ServoState, inputs: Any, rows: Any) -> ServoState:
     for i in range(len(inputs)):
         x, v, a, feedforward, load_force = [float(inputs[i, j]) for j in range(5)]
-        state, out = _step(kept, state, Setpoint(x, v, a), feedforward, load_force)
+        measured = measure(kept.value[0].cylinder, state.plant)
+        state, out = _step(kept, state, measured, Setpoint(x, v, a), feedforward, load_force)
         for column, value in enumerate(out[:9]):
             rows[i, column] = value
         rows[i, 9] = out.command.limited

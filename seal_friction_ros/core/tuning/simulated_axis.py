@@ -22,10 +22,19 @@ from typing import NamedTuple
 
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.parameters import meanings
+from seal_friction_ros.core.foundation.parameters import within_bounds
 from seal_friction_ros.core.servo import closed_loop
-from seal_friction_ros.core.servo.closed_loop import Axis, AxisRun, EvaluationMotions, Performance, without_feedforward
+from seal_friction_ros.core.servo.closed_loop import (
+    EVALUATED_PERIODS,
+    Axis,
+    AxisRun,
+    EvaluationMotions,
+    Performance,
+    without_feedforward,
+)
+from seal_friction_ros.core.servo.elastic_plant import ELASTICITIES, MOST_GROUPS, seals_of_plant
 from seal_friction_ros.core.servo.motions import Sine
+from seal_friction_ros.core.servo.tracking import error_area, reversal_rms, tracking_rms
 from seal_friction_ros.core.tuning.settings import FORCE_MARGIN, RobustnessCase, TunedFeedForward, TuningSettings
 
 MOST_CANDIDATES = 100  # settings after which the search ends, to bound its time
@@ -156,9 +165,7 @@ class TuningProblem:
 
 def bounded(name: str, value: float) -> float:
     """Value of a setting of the feed-forward, clamped to its bounds."""
-    meaning = meanings(FeedForwardSettings)[name]
-    lower, upper = meaning.lower, meaning.upper
-    return min(max(value, lower if lower is not None else value), upper if upper is not None else value)
+    return float(within_bounds(FeedForwardSettings, name, value))
 
 
 def force_limit(friction: float) -> float:
@@ -265,3 +272,45 @@ def _gentlest(point: SearchPoint, merit_at: Callable[[SearchPoint], float]) -> S
             while merit_at(gentler := point._replace(**{name: getattr(point, name) + sign * stride})) <= most:
                 point = gentler
     return point
+
+
+class ReversalQuality(NamedTuple):
+    """Tracking over the evaluated part of the sine."""
+
+    tracking_rms: float  # [m]
+    reversal_rms: float  # [m] near the reversals
+    error_area: float  # [m s] per reversal
+
+
+class PlantOutcome(NamedTuple):
+    """One plant without and with the feed-forward."""
+
+    plant: str  # of `ELASTICITIES`
+    without: ReversalQuality
+    tuned: ReversalQuality
+
+
+def on_plants(problem: TuningProblem, feedforward: FeedForwardSettings) -> tuple[PlantOutcome, ...]:
+    """The settings on each of `ELASTICITIES`; empty for three seals, or if a seal file has no presliding.
+
+    The search has one plant, on which its result grades itself. This is what the result is worth on a plant of another
+    structure, by measures that hold for elastic seals too.
+    """
+    servo = problem.axis.servo
+    if not 0 < len(servo.seals) <= MOST_GROUPS or not all(mounted.seal.presliding for mounted in servo.seals):
+        return ()
+    outcomes = []
+    for plant in ELASTICITIES:
+        elastic = seals_of_plant(plant, servo.seals, servo.load.mass)
+        other = replace(problem, axis=problem.axis._replace(servo=replace(servo, elastic=elastic)))
+        found = (_quality(other, settings) for settings in (without_feedforward(feedforward), feedforward))
+        outcomes.append(PlantOutcome(plant, *found))
+    return tuple(outcomes)
+
+
+def _quality(problem: TuningProblem, settings: FeedForwardSettings) -> ReversalQuality:
+    motions = problem.motions(SEARCH_HOLD)
+    part = motions.evaluated_part(problem.runs(settings)[0])
+    pair = part.reference, part.position
+    area = error_area(*pair, problem.axis.servo.control_period, 2 * EVALUATED_PERIODS)
+    return ReversalQuality(tracking_rms(*pair), reversal_rms(*pair), area)

@@ -4,7 +4,7 @@ The same case gives the same numbers, however many processes compute it.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, replace
 from functools import partial
@@ -16,6 +16,7 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.errors import NotConvergedError, named_errors
+from seal_friction_ros.core.foundation.parameters import within_bounds
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.presliding import presliding_of_map
@@ -31,13 +32,14 @@ from seal_friction_ros.core.lubrication.friction_map import (
     memory_length,
     pressure_asymmetry,
     steady_friction,
-    steady_rows,
+    steady_table,
 )
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, parse_lubrication_case, varied_case
-from seal_friction_ros.core.oring_contact.oring_case_file import OringCaseFile, parse_oring_case
+from seal_friction_ros.core.oring_contact.oring_case_file import OringCaseFile
 from seal_friction_ros.core.oring_contact.ring_friction import DISCRETISATION
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.contact.mesh_levels import COARSER, FINER, MOST_MESH_ERROR, change_of, other_lines
+from seal_friction_ros.offline.contact.oring_runs import read_oring_case
 from seal_friction_ros.offline.contact.section_files import with_files
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty
 from seal_friction_ros.offline.work.executor import Workers
@@ -46,7 +48,6 @@ from seal_friction_ros.offline.work.outcome import Outcome
 from seal_friction_ros.offline.work.seal_writer import rounded
 
 Parsed = TypeVar('Parsed')
-_FEWEST_CELLS = 32  # that a case may have
 LEAST_ASYMMETRY = 0.01  # [-] that a seal file has: less is an error of the mesh (our choice)
 STICTION_OF_A_RING = 0.13
 """[-] breakaway over sliding friction, less 1, of a map without speeds: mean of the thesis (our choice)"""
@@ -69,47 +70,34 @@ def read_case(name: str, parse: Callable[[Any, Callable[[str], OringCaseFile]], 
 
 
 def load_oring(name: str, beside: Path) -> OringCaseFile:
-    """O-ring case file in the folder ``beside``, from a path, or of a name in config/oring.
-
-    ValueError: the file cannot be read or a value is invalid; one line that names the file.
-    """
+    """O-ring case file in the folder ``beside``, from a path, or of a name in config/oring; as `read_oring_case`."""
     local = beside / f'{name}.yaml'
-    path = local if local.is_file() else config_path('oring', name)
-    try:
-        return parse_oring_case(read_yaml(path))
-    except ValueError as error:
-        text = str(error)
-        raise ValueError(text if text.startswith(str(path)) else f'{path}: {text}') from None
+    return read_oring_case(local if local.is_file() else config_path('oring', name))
 
 
 def compile_for_map(case: LubricationCase) -> None:
     """Compile the code of a friction map in this process, so that worker processes inherit it."""
-    numerics, grid = replace(case.numerics, cells=_FEWEST_CELLS), replace(case.map, velocities=2)
+    numerics = replace(case.numerics, cells=within_bounds(case.numerics, 'cells', 0))  # the fewest
     with suppress(NotConvergedError):
-        steady_friction(replace(case, oring=None, numerics=numerics, map=grid), 0.0)
+        steady_friction(replace(case, oring=None, numerics=numerics, map=replace(case.map, velocities=2)), 0.0)
 
 
 class MapRuns(NamedTuple):
-    """The friction map of a case, and its rows."""
+    """The friction map of a case, and the table that it is from."""
 
     case: LubricationCase
     law: FrictionMap
-    rows: list[SteadyFriction]
+    table: SteadyFriction  # over the pressures
     retried_steps: int  # steps that did not converge and were repeated in halves
     mesh_error: FloatArray | None = None
     """[-] change of each friction as of `change_of`, shape (pressures, speeds); None: not computed"""
     uncertainty: Uncertainty | None = None  # None: no samples
 
     @property
-    def directions(self) -> list[tuple[float, float]]:
-        """Friction [N] towards the pressure and away from it at the reference speed, at each pressure."""
-        return [directions(row, self.law.reference_speed, self.law.speeds) for row in self.rows]
-
-    @property
     def limits(self) -> str:
         """Where the film is out of its range, as a sentence; empty where it is not."""
-        touching, thinnest = max(row.real_contact for row in self.rows), min(row.thinnest for row in self.rows)
-        if not carries_film(self.rows):
+        touching, thinnest = self.table.real_contact.max(), self.table.thinnest.min()
+        if not carries_film(self.table):
             return (
                 f'At rest {touching:.2g} of the seal touches; above {PERCOLATION:g} no lubricant gets under it. So the '
                 'change with speed is not in the seal file: the friction is that at '
@@ -154,20 +142,21 @@ class MapRuns(NamedTuple):
 
     def numbers(self) -> dict[str, Any]:
         """Numbers for JSON."""
+        table, (towards, away) = self.table, directions(self.law, self.table).tolist()
         return {
             'case': self.case.name,
             'speed_m_s': self.law.speeds,
             'pressure_Pa': self.law.pressures,
-            'friction_N': [row.friction.tolist() for row in self.rows],
-            'towards_pressure_N': [towards for towards, _ in self.directions],
-            'away_from_pressure_N': [away for _, away in self.directions],
-            'pressure_asymmetry': pressure_asymmetry(self.law, self.rows),
-            'solid_share': [(row.solid / row.friction).tolist() for row in self.rows],
+            'friction_N': table.friction.tolist(),
+            'towards_pressure_N': towards,
+            'away_from_pressure_N': away,
+            'pressure_asymmetry': pressure_asymmetry(self.law, table),
+            'solid_share': (table.solid / table.friction).tolist(),
             'memory_length_m': self.law.memory_length,
             'presliding_length_m': self.law.presliding_length,
-            'real_contact_at_rest': [row.real_contact for row in self.rows],
-            'gap_over_roughness_at_rest': [row.thinnest for row in self.rows],
-            'speeds_in_seal_file': carries_film(self.rows),
+            'real_contact_at_rest': table.real_contact.tolist(),
+            'gap_over_roughness_at_rest': table.thinnest.tolist(),
+            'speeds_in_seal_file': carries_film(table),
             'retried_steps': self.retried_steps,
             'mesh_error': None if self.mesh_error is None else self.mesh_error.tolist(),
             'mesh_marked': None if self.mesh_error is None else (self.mesh_error > DISCRETISATION).tolist(),
@@ -193,11 +182,12 @@ def run_map(case: LubricationCase, workers: Workers, work: Path | None = None) -
     memory = Part(part_key('memory', asdict(known)), MemoryLength._fields, partial(memory_length, known))
     prepare = partial(compile_for_map, known)
     finer, here, coarser, lag = try_parts(f'{case.name}: map', [*tables, memory], workers, Kept(work), prepare)
-    rows, lags = rows_of(needed(here)), MemoryLength(**needed(lag))
-    retried = lags.retried_steps + sum(row.retried_steps for row in rows)
-    law = friction_map(case, rows, lags.length)
-    levels = [_frictions(outcome, rows) for outcome in (coarser, here, finer)]
-    return MapRuns(case, law, rows, retried, change_of(*levels))
+    table, lags = SteadyFriction(**needed(here)), MemoryLength(**needed(lag))
+    retried = lags.retried_steps + int(table.retried_steps.sum())
+    missing = {'friction': np.full_like(table.friction, np.nan)}  # of a mesh that failed
+    others = [np.asarray((mesh.result or missing)['friction']) for mesh in (coarser, finer)]
+    law = friction_map(case, table, lags.length)
+    return MapRuns(case, law, table, retried, change_of(others[0], table.friction, others[1]))
 
 
 def needed(outcome: Outcome[Values]) -> Values:
@@ -207,16 +197,9 @@ def needed(outcome: Outcome[Values]) -> Values:
     return outcome.result
 
 
-def _frictions(outcome: Outcome[Values], rows: Sequence[SteadyFriction]) -> FloatArray:
-    """Frictions of a table [N], shape (pressures, speeds); NaN of one that failed."""
-    if outcome.error:
-        return np.full((len(rows), len(rows[0].friction)), np.nan)
-    return np.asarray((outcome.result or {})['friction'])
-
-
 def other_mesh(case: LubricationCase, factor: float) -> LubricationCase:
     """The case with ``factor`` times as many cells, and lines of the elements of a ring."""
-    cells = max(round(factor * case.numerics.cells), _FEWEST_CELLS)
+    cells = within_bounds(case.numerics, 'cells', round(factor * case.numerics.cells))
     case = replace(case, numerics=replace(case.numerics, cells=cells))
     if case.oring is None:
         return case
@@ -226,26 +209,8 @@ def other_mesh(case: LubricationCase, factor: float) -> LubricationCase:
 
 
 def table_part(case: LubricationCase) -> Part:
-    """The rows of a case, `rows_of` its result."""
+    """The table of a case."""
     return Part(part_key('table', asdict(case)), SteadyFriction._fields, partial(steady_table, case))
-
-
-def steady_table(case: LubricationCase) -> dict[str, FloatArray]:
-    """`table_of` the `steady_rows` of a case."""
-    return table_of(steady_rows(case))
-
-
-def table_of(rows: Sequence[SteadyFriction]) -> dict[str, FloatArray]:
-    """Fields of rows, each over the pressures."""
-    return {
-        name: np.array(column) for name, column in zip(SteadyFriction._fields, zip(*rows, strict=True), strict=True)
-    }
-
-
-def rows_of(table: Values) -> list[SteadyFriction]:
-    """Rows of a `table_of` them."""
-    columns = [table[name] if table[name].ndim > 1 else table[name].tolist() for name in SteadyFriction._fields]
-    return [SteadyFriction(*row) for row in zip(*columns, strict=True)]
 
 
 def seal_document(computed: MapRuns, name: str) -> dict[str, Any]:
@@ -256,7 +221,7 @@ def seal_document(computed: MapRuns, name: str) -> dict[str, Any]:
     breakaway friction is the friction at the lowest speed of the map over that at its reference speed, mean over the
     pressures; of a map without speeds `STICTION_OF_A_RING`.
     """
-    case, law = computed.case, live_map(computed.law, computed.rows)
+    case, law = computed.case, live_map(computed.law, computed.table)
     if computed.uncertainty is None:
         relative_std = 0.7 if case.oring else 0.1
     else:
@@ -282,7 +247,7 @@ def seal_document(computed: MapRuns, name: str) -> dict[str, Any]:
         'uncertainty': {'relative_std': relative_std},
         'identified_pressure': [pressures[0], pressures[-1]],
     }
-    asymmetry = rounded(pressure_asymmetry(computed.law, computed.rows), 3)
+    asymmetry = rounded(pressure_asymmetry(computed.law, computed.table), 3)
     if abs(asymmetry) >= LEAST_ASYMMETRY:
         document['pressure_asymmetry'] = {'asymmetry': asymmetry, 'full_pressure': pressures[-1]}
     if elastic is not None:

@@ -7,14 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.parameters import within_bounds
 from seal_friction_ros.core.foundation.units import BAR
+from seal_friction_ros.core.oring_contact.oring_case import OringNumerics
 from seal_friction_ros.core.oring_contact.ring_friction import DISCRETISATION
 
-MOST_MESH_ERROR = (
-    0.05  # [-] change of a number on the next mesh above which it is said to be not converged (our choice)
-)
+MOST_MESH_ERROR = 0.05  # [-] change on the next mesh above which a number is called not converged (our choice)
 COARSER, FINER = 0.7, 1.4  # lines of the other two meshes over those of the case
-FEWEST_LINES, MOST_LINES = 9, 129  # that a ring may have
 
 
 class MeshLevels(NamedTuple):
@@ -55,7 +54,7 @@ class MeshLevels(NamedTuple):
 
 def other_lines(lines: int, factor: float) -> int:
     """Lines of a mesh with about ``factor`` times as many."""
-    return min(max(round(factor * lines), FEWEST_LINES), MOST_LINES)
+    return int(within_bounds(OringNumerics, 'lines', round(factor * lines)))
 
 
 def mesh_levels(

@@ -44,13 +44,9 @@ ON_OTHER_MESHES = (
 """Numbers of an `OringSummary` that are compared with other meshes; leakage and radial force are differences."""
 
 
-@dataclass(frozen=True)
-class Profile:
-    """Contact stress along a wall, at the nodes in contact, shape (n,)."""
-
-    position_m: tuple[float, ...]
-    """along rod and gland from the middle of the free ring, positive downstream; for the wall the radius"""
-    stress_Pa: tuple[float, ...]
+Profile = dict[str, list[float]]
+"""Contact stress along a wall, at the nodes in contact: ``stress_Pa`` at ``position_m``, which is along rod and gland
+from the middle of the free ring, positive downstream; for the wall the radius."""
 
 
 @dataclass(frozen=True)
@@ -122,16 +118,23 @@ def sliding_contact(case: OringCase, result: OringResult) -> WallContact:
     return result.rod if case.geometry.sliding_wall == 'rod' else result.gland
 
 
+def read_oring_case(path: Path) -> OringCaseFile:
+    """Case in a file; its section and rubber may be in files beside it, see `with_files`.
+
+    ValueError: the file cannot be read or a value is invalid; one line that names the file.
+    """
+    document = read_yaml(path)
+    with named_errors(path):
+        return parse_oring_case(with_files(document, path.parent))
+
+
 def compute_case(path: Path, task: Task | None = None) -> Computed:
-    """Compute a case file, with a progress bar; its section and rubber may be in files beside it, see `with_files`.
+    """Compute a case file, with a progress bar; see `read_oring_case`.
 
     ValueError: the file is invalid or insufficient for a seal file, or the ring does not fit, does not seal or has no
     equilibrium.
     """
-    document = read_yaml(path)
-    with named_errors(path):
-        file = parse_oring_case(with_files(document, path.parent))
-    return compute_file(file, path, task)
+    return compute_file(read_oring_case(path), path, task)
 
 
 def compute_file(file: OringCaseFile, path: Path, task: Task | None = None) -> Computed:
@@ -247,7 +250,7 @@ def _summary(
 
 
 def _profile(contact: WallContact) -> Profile:
-    return Profile(tuple(contact.position.tolist()), tuple(contact.stress.tolist()))
+    return {'position_m': contact.position.tolist(), 'stress_Pa': contact.stress.tolist()}
 
 
 def seal_document(computed: Computed, spread: Spread | None = None) -> dict[str, Any]:

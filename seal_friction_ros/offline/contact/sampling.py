@@ -74,13 +74,6 @@ def coarse_ring(case: OringCase) -> OringCase:
     return replace(case, numerics=replace(case.numerics, lines=other_lines(case.numerics.lines, COARSER)))
 
 
-class RingForces(NamedTuple):
-    """Forces of a dry ring on the wall on which it slides, at each pressure."""
-
-    normal_force: FloatArray  # [N]
-    friction: FloatArray  # [N] NaN without a law
-
-
 class RingUncertainty(NamedTuple):
     """Uncertainty of the forces of a dry ring."""
 
@@ -113,7 +106,7 @@ def uncertain_ring(
         varied = varied_ring(case, values)
         check_pressures(varied, pressures)
         key = part_key('ring', [_plain(varied), pressures, type(law).__name__, asdict(law) if law else {}])
-        return [Part(key, RingForces._fields, partial(ring_forces, varied, pressures, law))]
+        return [Part(key, ('normal_force', 'friction'), partial(ring_forces, varied, pressures, law))]
 
     outcome = sampled(f'{case.name}: samples', names, drawn, parts_of, workers, work)
     forces = np.array([ring['normal_force'] for (ring,) in outcome.computed])
@@ -130,11 +123,14 @@ def uncertain_ring(
     return RingUncertainty(made(forces[0], forces[1:]), made(friction[0], friction[1:]))
 
 
-def ring_forces(case: OringCase, pressures: tuple[float, ...], law: RingLaw | None) -> RingForces:
-    """Forces of a ring at increasing pressures [Pa, gauge]."""
+def ring_forces(case: OringCase, pressures: tuple[float, ...], law: RingLaw | None) -> dict[str, FloatArray]:
+    """Normal force and friction [N] of a dry ring on its sliding wall at increasing pressures [Pa, gauge].
+
+    Without a law the friction is NaN.
+    """
     contacts = [sliding_contact(case, result) for result in oring_results(case, pressures)]
     friction = [math.nan if law is None else friction_of_contact(law, contact) for contact in contacts]
-    return RingForces(np.array([contact.force for contact in contacts]), np.array(friction))
+    return {'normal_force': np.array([contact.force for contact in contacts]), 'friction': np.array(friction)}
 
 
 class Sampled(NamedTuple):

@@ -11,6 +11,7 @@ from matplotlib.ticker import FuncFormatter
 from seal_friction_ros.core.estimation.findings import LOOK, Verdict, percent
 from seal_friction_ros.core.foundation.arrays import BoolArray
 from seal_friction_ros.core.foundation.units import BAR, MM
+from seal_friction_ros.core.lubrication.friction_map import directions
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
 from seal_friction_ros.core.oring_contact.ring_friction import DISCRETISATION
 from seal_friction_ros.offline.contact.lubrication_runs import MapRuns
@@ -26,13 +27,12 @@ from seal_friction_ros.offline.work.status import command_line
 @house_style()
 def write_map_page(computed: MapRuns, out: Path) -> tuple[Path, ...]:
     """Write the page of a friction map; see `write_page`."""
-    shape = len(computed.rows), len(computed.law.speeds)
-    errors = np.zeros(shape) if computed.mesh_error is None else computed.mesh_error
+    frictions = computed.table.friction
+    errors = np.zeros_like(frictions) if computed.mesh_error is None else computed.mesh_error
     plots, spread = [map_figure(computed)], ''
     if computed.uncertainty is not None:
         plots.append(quantiles_figure(computed.uncertainty))
         spread = f', with a relative standard deviation of {percent(computed.uncertainty.relative_std)} by samples'
-    frictions = np.concatenate([row.friction for row in computed.rows])
     text = f'Friction {frictions.min():.3g} to {frictions.max():.3g} N over the map{spread}; computed, not measured.'
     after = 'write a seal file for the node: --seal-file.'
     if '--seal-file' in command_line():
@@ -53,18 +53,19 @@ def write_map_page(computed: MapRuns, out: Path) -> tuple[Path, ...]:
 
 def _map_table(computed: MapRuns, marked: BoolArray) -> Table:
     """Row for each speed and, at the reference speed, direction; ``marked`` where the mesh changes the friction."""
-    frictions = np.array([row.friction for row in computed.rows]).T
+    frictions = computed.table.friction.T.tolist()
     rows = [
         (
             number(speed / MM),
             *(number(one, 3) + (' *' if mark else '') for one, mark in zip(of_speed, marks, strict=True)),
         )
-        for speed, of_speed, marks in zip(computed.law.speeds, frictions.tolist(), marked.T.tolist(), strict=True)
+        for speed, of_speed, marks in zip(computed.law.speeds, frictions, marked.T.tolist(), strict=True)
     ]
     reference = number(computed.law.reference_speed / MM)
-    for k, text in enumerate(('towards the pressure', 'away from it')):
-        rows.append((f'{reference}, {text}', *(number(each[k], 3) for each in computed.directions)))
-    return Table(('speed [mm/s]', *(f'{row.pressure / BAR:.3g} bar' for row in computed.rows)), rows)
+    ways = directions(computed.law, computed.table).tolist()
+    for way, text in zip(ways, ('towards the pressure', 'away from it'), strict=True):
+        rows.append((f'{reference}, {text}', *(number(friction, 3) for friction in way)))
+    return Table(('speed [mm/s]', *(f'{pressure / BAR:.3g} bar' for pressure in computed.law.pressures)), rows)
 
 
 def write_case_page(
@@ -95,16 +96,16 @@ def map_figure(computed: MapRuns) -> Plot:
     """Steady friction over speed, for each pressure."""
     figure, (left, right) = style.new_figure('Steady friction falls as the film lifts the seal', 4.4, ncols=2)
     speeds = np.array(computed.law.speeds) / MM
-    looks = style.shades([f'{row.pressure / BAR:g} bar' for row in computed.rows])
-    for row, look in zip(computed.rows, looks, strict=True):
-        left.semilogx(speeds, row.friction, **look)
-        right.semilogx(speeds, row.solid / row.friction, **look)
+    looks = style.shades([f'{pressure / BAR:g} bar' for pressure in computed.law.pressures])
+    for friction, solid, look in zip(computed.table.friction, computed.table.solid, looks, strict=True):
+        left.semilogx(speeds, friction, **look)
+        right.semilogx(speeds, solid / friction, **look)
     left.set(ylabel='friction of the seal [N]', ylim=(0.0, None))
     right.set_ylabel('solid share [-]')
     for ax in (left, right):
         ax.set_xlabel('speed [mm/s]')
         ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f'{value:g}'))
-    style.legend_below(figure, left, len(computed.rows))
+    style.legend_below(figure, left, len(looks))
     return Plot('friction_map', figure)
 
 

@@ -31,11 +31,17 @@ from seal_friction_ros.core.servo import simulator_options as simulator
 from seal_friction_ros.core.servo.closed_loop import IDEAL_SENSORS, Axis, AxisSensors
 from seal_friction_ros.core.servo.sensors import SensorSettings
 from seal_friction_ros.core.servo.tracking import tracking_peak, tracking_rms
-from seal_friction_ros.core.tuning.other_plants import PlantOutcome, on_plants
 from seal_friction_ros.core.tuning.output_gain import CommandRecord, OutputGain, output_gain
 from seal_friction_ros.core.tuning.recorded_axis import RecordedTuning, Recording, tune_recorded_axis
 from seal_friction_ros.core.tuning.settings import FORCE_MARGIN, RecordedAxisSettings, TunedFeedForward, TuningSettings
-from seal_friction_ros.core.tuning.simulated_axis import MOST_CANDIDATES, Tuning, TuningProblem, tune
+from seal_friction_ros.core.tuning.simulated_axis import (
+    MOST_CANDIDATES,
+    PlantOutcome,
+    Tuning,
+    TuningProblem,
+    on_plants,
+    tune,
+)
 from seal_friction_ros.files import default_configuration, read_parameters
 from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag
 from seal_friction_ros.offline.bags.bag import BagError, read_definitions

@@ -16,16 +16,15 @@ from seal_friction_ros.core.lubrication import contact as contact_module
 from seal_friction_ros.core.lubrication.contact import (
     ContactState,
     LubricatedContact,
-    asperity_pressure,
     contact_step,
     dry_contact,
     film_properties,
 )
-from seal_friction_ros.core.lubrication.elasticity import HalfPlane
+from seal_friction_ros.core.lubrication.elasticity import ElasticBody, half_plane
 from seal_friction_ros.core.lubrication.flow_factors import shear_stress_coefficients, shear_stress_factors
 from seal_friction_ros.core.lubrication.grease import Grease
+from seal_friction_ros.core.lubrication.model import fluid_shear, real_area_share, solid_shear
 from seal_friction_ros.core.lubrication.reynolds import FilmEnds
-from seal_friction_ros.core.lubrication.shear import fluid_shear, real_area_share, solid_shear
 from seal_friction_ros.core.lubrication.topography import Topography
 
 LENGTH, RADIUS, MODULUS, DEPTH = 0.6e-3, 1e-3, 14.28e6, 1e-3  # [m], [m], [Pa], [m]
@@ -40,7 +39,7 @@ def profile(cells: int, interference: float = 36e-6):
 
 
 def made(cells: int, topography: Topography = ROUGH, grease: Grease = GREASE) -> LubricatedContact:
-    return LubricatedContact(HalfPlane(cells, LENGTH / cells, MODULUS, DEPTH), topography, grease)
+    return LubricatedContact(half_plane(cells, LENGTH / cells, MODULUS, DEPTH), topography, grease)
 
 
 def slid(
@@ -83,7 +82,7 @@ def thick_film(cells: int, velocity: float = 0.2):
     """Smooth soft contact, fully lifted: the dry rough contact gives a first guess."""
     rough = made(cells)
     gap = dry_contact(rough, profile(cells))
-    pressure, _ = asperity_pressure(gap, rough.asperities)
+    pressure, _ = rough.asperity_pressure(gap)
     smooth = made(cells, SMOOTH, OIL)
     return smooth, slid(
         smooth, ContactState(gap + 1e-6, pressure, np.ones(cells)), velocity, (0.01, 0.1, 1, 10, 100, math.inf)
@@ -93,7 +92,7 @@ def thick_film(cells: int, velocity: float = 0.2):
 def test_dry_contact_carries_nearly_the_pressure_of_hertz():
     contact = made(226, Topography(rms_height=0.2e-6, rms_slope=0.9, roll_off_length=2e-6))
     state = dry(contact)
-    pressure, _ = asperity_pressure(state.gap, contact.asperities)
+    pressure, _ = contact.asperity_pressure(state.gap)
     load = pressure.sum() * LENGTH / 226
     assert pressure.max() == pytest.approx(math.sqrt(load * MODULUS / (math.pi * RADIUS)), rel=0.02)
 
@@ -172,8 +171,8 @@ def test_every_step_conserves_mass_and_keeps_film_and_void_apart():
         assert abs(volume - old.sum() * LENGTH / 226 - gained) <= 1e-12 * volume
         assert np.abs(state.pressure / 1e6 * (1.0 - state.saturation)).max() <= 1e-12
         assert state.pressure.min() >= -1e-6
-        solid, _ = asperity_pressure(state.gap, contact.asperities)
-        elastic = state.gap - profile(226) - contact.body.matrix() @ (state.pressure + solid)
+        solid, _ = contact.asperity_pressure(state.gap)
+        elastic = state.gap - profile(226) - contact.body.matrix @ (state.pressure + solid)
         assert np.abs(elastic).max() <= 2e-13
 
 
@@ -280,7 +279,7 @@ def test_what_does_not_converge_says_which_part_of_it(monkeypatch):
 class Counted:
     """A body that counts how often it is deflected."""
 
-    def __init__(self, body: HalfPlane) -> None:
+    def __init__(self, body: ElasticBody) -> None:
         self._body, self.deflections = body, 0
 
     def __getattr__(self, name):
@@ -294,7 +293,7 @@ class Counted:
 @pytest.mark.parametrize('compliance_factor', [1.0, 0.25, 0.0625])
 def test_banded_stiffness_prepares_the_elastic_equation_whatever_share_of_the_compliance_acts(compliance_factor):
     """A solve of GMRES that is well prepared needs few products, each one deflection; so does the whole step."""
-    body = Counted(HalfPlane(96, LENGTH / 96, MODULUS, DEPTH))
+    body = Counted(half_plane(96, LENGTH / 96, MODULUS, DEPTH))
     contact = LubricatedContact(body, ROUGH, GREASE)
     start = dry(contact)
     rigid = profile(96) + (1.0 - compliance_factor) * (start.gap - profile(96))  # the rest has crept
@@ -317,7 +316,7 @@ def test_plates_that_creep_under_high_pressure_carry_their_film_along(velocity):
     That error over a cell, 2e-9 Pa / 19 um, moves 8e-17 m^2/s; the walls move 5e-11 m^2/s, and have to within 1e-13.
     """
     oil = Grease(yield_stress=0.0, consistency_index=0.0, base_viscosity=0.1)
-    contact = LubricatedContact(HalfPlane(32, LENGTH / 32, 1e13, DEPTH), ROUGH, oil)
+    contact = LubricatedContact(half_plane(32, LENGTH / 32, 1e13, DEPTH), ROUGH, oil)
     even, rigid = np.ones(32), np.full(32, 1e-4)
     gap = rigid + contact.body.deflection(1e7 * even)
     away = ContactState(gap, 1e7 * (1.0 + 1e-9 * np.sin(np.arange(32.0))), even)

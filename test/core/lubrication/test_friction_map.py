@@ -19,12 +19,12 @@ from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.seal_file import mount_seals
 from seal_friction_ros.core.lubrication import friction_map as module
 from seal_friction_ros.core.lubrication.contact import ContactState
-from seal_friction_ros.core.lubrication.friction_map import friction_map, memory_length, steady_friction
+from seal_friction_ros.core.lubrication.friction_map import friction_map, memory_length, stacked, steady_friction
 from seal_friction_ros.core.lubrication.grease import Grease
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, MapGrid
 from seal_friction_ros.core.lubrication.model import film_at_rest, profile_model, solid_limit
 from seal_friction_ros.core.lubrication.oring_film import oring_film
-from seal_friction_ros.core.lubrication.seal_profile import LubricationNumerics
+from seal_friction_ros.core.lubrication.seal_section import LubricationNumerics
 from seal_friction_ros.core.lubrication.topography import Topography
 from seal_friction_ros.core.messages.records import Force, Pressure
 from seal_friction_ros.core.oring_contact.oring_case import OringNumerics
@@ -50,7 +50,7 @@ def rows():
 
 
 def test_map_falls_with_speed_and_rises_with_pressure(rows):
-    law = friction_map(CASE, rows, 1e-4)
+    law = friction_map(CASE, stacked(rows), 1e-4)
     table = np.array(law.frictions).reshape(2, 5)
     assert (np.diff(table, axis=1) < 0.0).all()
     assert (np.diff(table, axis=0) > 0.0).all()
@@ -73,7 +73,7 @@ def test_symmetrical_seal_without_pressure_rubs_alike_both_ways(rows):
 
 def test_rows_that_are_not_of_the_grid_are_refused(rows):
     with pytest.raises(ValueError, match='the rows are not those'):
-        friction_map(CASE, rows[:1], 0.0)
+        friction_map(CASE, stacked(rows[:1]), 0.0)
 
 
 @pytest.fixture(scope='module')
@@ -95,16 +95,16 @@ def test_friction_of_a_ring_from_its_drawing_falls_with_speed_and_rises_with_pre
     assert (np.diff(table, axis=1) < 0.0).all()
     assert (np.diff(table, axis=0) > 0.0).all()
     assert rows[0].direction_difference == pytest.approx(np.zeros(5), abs=1e-3)  # the same both ways without fluid
-    law = friction_map(case, rows, 1e-4)
+    law = friction_map(case, stacked(rows), 1e-4)
     assert law.presliding_length == pytest.approx(rows[1].friction[0] / rows[1].stiffness)
 
 
 def test_a_ring_that_lets_no_lubricant_in_has_one_friction_at_all_speeds(ring_row):
     """A contact percolates at a real contact of 0.42. A seal of the paper stays far below."""
     case, rows = ring_row
-    assert not module.carries_film(rows)
-    law = friction_map(case, rows, 1e-4)
-    live = module.live_map(law, rows)
+    assert not module.carries_film(stacked(rows))
+    law = friction_map(case, stacked(rows), 1e-4)
+    live = module.live_map(law, stacked(rows))
     assert not live.depends_on_speed
     assert (live.speeds, live.memory_length) == ((case.motion.speed,), 0.0)
     for pressure in (0.0, 1e5, 3e5, 9e5):
@@ -121,25 +121,25 @@ def test_the_share_of_a_direction_is_that_of_the_line_through_no_pressure():
         module.SteadyFriction(p, np.full(3, 10.0), np.full(3, 9.0), np.array([0.0, d, 2.0 * d]), 2e4, 0)
         for p, d in ((0.0, 0.0), (0.5e5, 2.0), (1e5, 4.0))
     ]
-    assert module.directions(rows[2], 1e-2, law.speeds) == pytest.approx((12.0, 8.0))
-    assert module.pressure_asymmetry(law, rows) == pytest.approx(0.2)
+    assert module.directions(law, stacked(rows))[:, 2] == pytest.approx([12.0, 8.0])
+    assert module.pressure_asymmetry(law, stacked(rows)) == pytest.approx(0.2)
 
 
 def test_a_ring_rubs_less_towards_its_pressure(ring_row):
     case, rows = ring_row
-    assert -0.9 < module.pressure_asymmetry(friction_map(case, rows, 1e-4), rows) < -0.01
+    assert -0.9 < module.pressure_asymmetry(friction_map(case, stacked(rows), 1e-4), stacked(rows)) < -0.01
 
 
 def test_a_seal_that_lets_lubricant_in_keeps_its_speeds(rows):
-    assert module.carries_film(rows)
-    law = friction_map(CASE, rows, 1e-4)
-    assert module.live_map(law, rows) == law
+    assert module.carries_film(stacked(rows))
+    law = friction_map(CASE, stacked(rows), 1e-4)
+    assert module.live_map(law, stacked(rows)) == law
 
 
 @pytest.mark.parametrize(('fall', 'is_levelled'), [(0.0004, True), (0.029, True), (0.04, False)])
 def test_a_fall_with_pressure_within_the_error_of_the_mesh_is_levelled(rows, fall, is_levelled):
     falls = dataclasses.replace(LAW, frictions=(3.0, 2.0, 1.0, *(np.array([3.0, 2.0, 1.0]) * (1.0 - fall)).tolist()))
-    live = module.live_map(falls, rows)
+    live = module.live_map(falls, stacked(rows))
     assert (live.coulomb_friction(1e5) >= (1.0 - 1e-12) * live.coulomb_friction(0.0)) == is_levelled
     assert live.frictions[:3] == falls.frictions[:3]
     if not is_levelled:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from seal_friction_ros.core.lubrication import contact as contact_module
-from seal_friction_ros.core.lubrication.elasticity import HalfPlane
+from seal_friction_ros.core.lubrication.elasticity import half_plane
 from seal_friction_ros.core.lubrication.reynolds import FilmEnds, complementarity, reynolds_rows
 
 CELLS = 7
@@ -142,10 +142,10 @@ def test_flow_left_to_the_unknown_is_the_residual_less_what_the_complementarity_
 
 def test_banded_stiffness_is_nearly_the_inverse_of_the_compliance_and_carries_an_even_pressure():
     """Beside the cell itself it falls as 1 / r^2; the sum of a row is the modulus over the length of the film."""
-    plane = HalfPlane(64, 5e-6, 1.4e7, 1e-3)
+    plane = half_plane(64, 5e-6, 1.4e7, 1e-3)
     band = plane.stiffness_band
     assert len(band) == 7
-    inverse = np.linalg.inv(plane.matrix())[32, 32:39]
+    inverse = np.linalg.inv(plane.matrix)[32, 32:39]
     assert band[1:] == pytest.approx(inverse[1:], rel=0.02)
     assert band[0] == pytest.approx(inverse[0], rel=0.1)
     assert band[0] + 2.0 * band[1:].sum() == pytest.approx(1.4e7 / (64 * 5e-6), rel=1e-12)

@@ -8,14 +8,20 @@ import yaml
 from paths import ROOT
 
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
-from seal_friction_ros.core.lubrication.friction_map import SteadyFriction, friction_map, map_pressures, map_speeds
+from seal_friction_ros.core.lubrication.friction_map import (
+    SteadyFriction,
+    friction_map,
+    map_pressures,
+    map_speeds,
+    stacked,
+)
 from seal_friction_ros.core.lubrication.lubrication_case import (
     LubricationCase,
     MapGrid,
     parse_lubrication_case,
     varied_case,
 )
-from seal_friction_ros.core.lubrication.seal_profile import SealBody
+from seal_friction_ros.core.lubrication.seal_section import SealBody
 from seal_friction_ros.core.lubrication.topography import Topography
 from seal_friction_ros.core.oring_contact.material import elastic_modulus_of_hardness
 from seal_friction_ros.core.oring_contact.oring_case_file import OringCaseFile, parse_oring_case
@@ -124,7 +130,7 @@ def test_law_has_its_rows_in_order_of_pressure_and_its_presliding_from_the_lowes
     """A ring that no pressure holds rolls: its length is that of the next pressure."""
     case = LubricationCase(name='x', map=GRID, oring=load('blind').case if oring else None)
     rows = [row(4e5, 4.0, 5e4), row(0.0, 2.0, 1e4), row(2e5, 3.0, 4e4)]
-    law = friction_map(case, rows, 7e-4)
+    law = friction_map(case, stacked(rows), 7e-4)
     assert law == FrictionMap(
         speeds=tuple(map_speeds(GRID).tolist()),
         pressures=(0.0, 2e5, 4e5),
@@ -134,7 +140,7 @@ def test_law_has_its_rows_in_order_of_pressure_and_its_presliding_from_the_lowes
         presliding_length=length,
     )
     with pytest.raises(ValueError, match='the rows are not those of the pressures of the grid'):
-        friction_map(case, [*rows[:2], row(1e5, 3.0, 4e4)], 7e-4)
+        friction_map(case, stacked([*rows[:2], row(1e5, 3.0, 4e4)]), 7e-4)
 
 
 # -- a seal at rest

@@ -11,12 +11,11 @@ from paths import ROOT
 from scipy.integrate import trapezoid
 
 from seal_friction_ros.core.lubrication import oring_film as module
-from seal_friction_ros.core.lubrication.contact import asperity_pressure
 from seal_friction_ros.core.lubrication.friction_map import steady_state
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
 from seal_friction_ros.core.lubrication.model import fluid_force, solid_limit
 from seal_friction_ros.core.lubrication.oring_film import FILM_CROWDING, OringFilm, flat_part, oring_film
-from seal_friction_ros.core.lubrication.seal_profile import LubricationNumerics
+from seal_friction_ros.core.lubrication.seal_section import LubricationNumerics
 from seal_friction_ros.core.lubrication.topography import Topography
 from seal_friction_ros.core.oring_contact.compliance import SlidingFace, sliding_face
 from seal_friction_ros.core.oring_contact.loading import loaded_states, oring_model
@@ -83,7 +82,7 @@ def test_under_a_high_pressure_the_film_ends_outside_the_contact_where_the_face_
     """At 69 bar the wall of the groove is next to the contact; the gap opens there by 100 um within 60 um."""
     ring = dataclasses.replace(ring_on('rod'), numerics=OringNumerics(lines=lines))
     film = oring_film(case_of(ring), ring, 6.9e6)
-    solid, _ = asperity_pressure(film.start.gap, film.model.contact.asperities)
+    solid, _ = film.model.contact.asperity_pressure(film.start.gap)
     assert film.start.gap.min() > 0.0
     assert film.start.gap[-1] > 3e-6
     assert solid[-1] < 1e-3 * solid.max()
@@ -125,7 +124,7 @@ def test_fluid_stands_up_to_the_peak_of_the_contact_and_nothing_beyond_it(sealed
 def test_ring_at_rest_is_in_balance_with_fluid_and_asperities(sealed):
     """It is h = g + K (p + p_c); both carry what the dry ring carried; beside the contact the gap is still its own."""
     model, (gap, fluid, _) = sealed.film.model, sealed.film.start
-    solid, _ = asperity_pressure(gap, model.contact.asperities)
+    solid, _ = model.contact.asperity_pressure(gap)
     assert gap == pytest.approx(model.profile + model.contact.body.deflection(fluid + solid), abs=1e-12)
     place, face = model.place, sealed.face
     within = np.linspace(place[0], place[-1], 2001)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from seal_friction_ros.core.lubrication.contact import LubricatedContact, film_properties
-from seal_friction_ros.core.lubrication.elasticity import HalfPlane
+from seal_friction_ros.core.lubrication.elasticity import half_plane
 from seal_friction_ros.core.lubrication.flow_factors import (
     flow_factor_coefficients,
     pressure_flow_factor,
@@ -15,8 +15,8 @@ from seal_friction_ros.core.lubrication.flow_factors import (
     shear_stress_factors,
 )
 from seal_friction_ros.core.lubrication.grease import Grease, apparent_viscosity
+from seal_friction_ros.core.lubrication.model import fluid_shear, real_area_share, solid_shear
 from seal_friction_ros.core.lubrication.reynolds import FilmEnds
-from seal_friction_ros.core.lubrication.shear import fluid_shear, real_area_share, solid_shear
 from seal_friction_ros.core.lubrication.topography import Topography
 
 CELLS, WIDTH, MODULUS = 20, 5e-6, 1e7  # [1], [m], [Pa]
@@ -72,7 +72,7 @@ def test_film_is_driven_by_the_pressure_beyond_its_ends():
 
 def test_lightly_loaded_asperities_touch_on_an_area_in_proportion_to_their_pressure():
     """A = erf(x), x = sqrt 2 p / (E* h'): 2 x / sqrt pi for small x, 0.3286 at x = 0.3."""
-    contact = LubricatedContact(HalfPlane(16, 1e-6, MODULUS, 1e-3), Topography(rms_slope=0.8), OIL)
+    contact = LubricatedContact(half_plane(16, 1e-6, MODULUS, 1e-3), Topography(rms_slope=0.8), OIL)
     pressure = contact.topography.contact_stiffness(MODULUS)
     length = contact.topography.separation_length
     whole = contact.topography.real_area_pressure(MODULUS)
@@ -110,13 +110,13 @@ def test_closed_gap_flows_like_one_of_a_nanometre_whatever_it_does():
 
 
 def test_share_of_the_wall_in_the_roughness_goes_from_all_on_the_seal_to_all_on_the_wall():
-    plane = HalfPlane(16, 1e-6, MODULUS, 1e-3)
+    plane = half_plane(16, 1e-6, MODULUS, 1e-3)
     shares = [LubricatedContact(plane, Topography(wall_share=share), OIL).rough[1] for share in (0.0, 0.5, 1.0)]
     assert shares == [-1.0, 0.0, 1.0]
 
 
 def test_film_is_sheared_as_between_smooth_walls_unless_the_case_asks_for_the_factors():
-    plane = HalfPlane(16, 1e-6, MODULUS, 1e-3)
+    plane = half_plane(16, 1e-6, MODULUS, 1e-3)
     with_, without = (
         LubricatedContact(plane, Topography(shear_stress_factors=on), OIL).stress_roughness[0] for on in (True, False)
     )

@@ -15,10 +15,9 @@ from paths import ROOT
 from seal_friction_ros.core.foundation.errors import NotConvergedError
 from seal_friction_ros.core.foundation.units import INCH, LBF, PSI
 from seal_friction_ros.core.friction.geometry import SealGeometry, projected_area
-from seal_friction_ros.core.oring_contact import continuation, loading
+from seal_friction_ros.core.oring_contact import equilibrium, loading
 from seal_friction_ros.core.oring_contact.elements import deformation_gradient, volume_ratios
 from seal_friction_ros.core.oring_contact.equilibrium import make_assembly, solve_equilibrium, unstressed_state
-from seal_friction_ros.core.oring_contact.extrusion import extrusion_pressure
 from seal_friction_ros.core.oring_contact.loading import oring_model, squeeze_ring
 from seal_friction_ros.core.oring_contact.material import Rubber
 from seal_friction_ros.core.oring_contact.oring_case import (
@@ -26,6 +25,7 @@ from seal_friction_ros.core.oring_contact.oring_case import (
     OringCase,
     OringNumerics,
     check_pressures,
+    extrusion_pressure,
     gland_fill,
     stretched_section_diameter,
 )
@@ -318,7 +318,7 @@ def test_no_equilibrium_is_an_error_and_not_a_number(monkeypatch: pytest.MonkeyP
     def never(*_):
         raise NotConvergedError('1.0e-03 2 pi R E d after 25 Newton steps')
 
-    monkeypatch.setattr(continuation, 'solve_equilibrium', never)
+    monkeypatch.setattr(equilibrium, 'solve_equilibrium', never)
     with pytest.raises(
         NotConvergedError, match=r'case mine: no equilibrium of the squeezed ring: at 0 % of the path: 1.0e-03'
     ):
@@ -340,7 +340,7 @@ def test_no_equilibrium_with_friction_of_the_walls_is_an_error_that_says_so(monk
 
 
 def test_a_step_that_fails_is_tried_again_shorter(monkeypatch: pytest.MonkeyPatch):
-    solve, failures = continuation.solve_equilibrium, []
+    solve, failures = equilibrium.solve_equilibrium, []
 
     def sometimes(model, assembly, surroundings, start):
         if len(failures) < 2 and surroundings.pressure > 1e6:
@@ -349,7 +349,7 @@ def test_a_step_that_fails_is_tried_again_shorter(monkeypatch: pytest.MonkeyPatc
         return solve(model, assembly, surroundings, start)
 
     (plain,) = oring_results(ring(), (2e6,))
-    monkeypatch.setattr(continuation, 'solve_equilibrium', sometimes)
+    monkeypatch.setattr(equilibrium, 'solve_equilibrium', sometimes)
     (hindered,) = oring_results(ring(), (2e6,))
     assert len(failures) == 2
     assert hindered.rod.force == pytest.approx(plain.rod.force, rel=0.01)

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from seal_friction_ros.core.foundation.errors import NotConvergedError
-from seal_friction_ros.core.oring_contact import continuation
-from seal_friction_ros.core.oring_contact.continuation import follow_path
-from seal_friction_ros.core.oring_contact.equilibrium import OringState
+from seal_friction_ros.core.oring_contact import equilibrium as newton
+from seal_friction_ros.core.oring_contact.equilibrium import OringState, follow_path
 from seal_friction_ros.core.oring_contact.results import WallContact, _edge
 from seal_friction_ros.core.oring_contact.surroundings import Surroundings
 
@@ -36,7 +35,7 @@ class Equilibrium:
 @pytest.fixture
 def followed(monkeypatch):
     def follow(equilibrium: Equilibrium, stride: float, **more):
-        monkeypatch.setattr(continuation, 'solve_equilibrium', equilibrium)
+        monkeypatch.setattr(newton, 'solve_equilibrium', equilibrium)
         return follow_path(None, None, lambda share, *_: at(share), START, stride, **more)
 
     return follow

@@ -303,7 +303,7 @@ def test_the_stiffness_is_the_derivative_of_the_forces_to_1e_8(friction: float, 
 
 def test_held_displacements_are_left_out_of_the_stiffness_and_nothing_else():
     model = make_model(MESH, RUBBER, SECTION, 0.05)
-    at = force_balance(model, around(), unstressed_state(model, shaken()))
+    at = force_balance(model, around(), unstressed_state(model)._replace(displacement=shaken()))
     whole = stiffness_matrix(make_assembly(model), at.entries).toarray()
     held = (3, 40)
     part = stiffness_matrix(make_assembly(model, held), at.entries)
@@ -314,7 +314,7 @@ def test_held_displacements_are_left_out_of_the_stiffness_and_nothing_else():
 
 def test_folded_elements_have_no_balance():
     model = make_model(MESH, RUBBER, SECTION, 0.05)
-    assert force_balance(model, around(), unstressed_state(model, shaken(1e-3))) is None
+    assert force_balance(model, around(), unstressed_state(model)._replace(displacement=shaken(1e-3))) is None
 
 
 def test_each_node_of_the_outline_feels_itself_and_its_two_neighbours():

@@ -10,7 +10,6 @@ from seal_friction_ros.core.foundation.units import INCH, PSI
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws.contact_shear import ShearLaw
 from seal_friction_ros.core.friction.laws.friction_coefficient import PowerLaw
-from seal_friction_ros.core.oring_contact.extrusion import extrusion_pressure
 from seal_friction_ros.core.oring_contact.material import (
     Rubber,
     elastic_modulus_of_hardness,
@@ -20,6 +19,7 @@ from seal_friction_ros.core.oring_contact.oring_case import (
     Groove,
     OringCase,
     check_pressures,
+    extrusion_pressure,
     gland_fill,
     stretched_section_diameter,
 )

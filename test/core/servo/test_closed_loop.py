@@ -30,7 +30,7 @@ from seal_friction_ros.core.servo.closed_loop import (
 from seal_friction_ros.core.servo.controller import Measurement
 from seal_friction_ros.core.servo.cylinder import pressure_force
 from seal_friction_ros.core.servo.motions import RoundedWave, Setpoint, Sine, Step, Trapezoid
-from seal_friction_ros.core.servo.position_servo import ServoParameters, init, outputs, step, step_measured
+from seal_friction_ros.core.servo.position_servo import ServoParameters, init, outputs, step
 from seal_friction_ros.core.servo.sensors import SensorSettings
 from seal_friction_ros.core.servo.tracking import reversals, tracking_rms
 from seal_friction_ros.files import read_yaml
@@ -285,7 +285,7 @@ def test_an_encoder_counts_its_steps_and_its_velocity_is_their_difference_over_t
         expected = (ten[-1] - ten[0]) / (PERIOD * (len(ten) - 1)) if i else 0.0
         assert velocity.velocity == pytest.approx(expected, abs=1e-12)
         measured = Measurement(counts[-1], expected, out.pressure_a + 1e3, out.pressure_b + 2e3)
-        state, out = step_measured(machine, state, measured, wave.at(i * PERIOD), 10.0 * (i + 1))
+        state, out = step(machine, state, wave.at(i * PERIOD), 10.0 * (i + 1), measured=measured)
         assert (run.position[i], run.velocity[i]) == pytest.approx((out.position, out.velocity), rel=1e-6, abs=1e-12)
         assert run.friction_force[i] == pytest.approx(out.friction_force, rel=1e-6)
     assert len(set(counts)) > 5

@@ -36,7 +36,6 @@ from seal_friction_ros.core.servo.position_servo import (
     outputs,
     simulate,
     step,
-    step_measured,
 )
 from seal_friction_ros.core.servo.tracking import dwell_per_reversal, reversals, tracking_peak, tracking_rms
 
@@ -337,8 +336,8 @@ def test_a_step_without_feed_forward_and_load_has_none_and_ideal_sensors_measure
     for i in range(20):
         setpoint = WAVE.at(i * SERVO.control_period)
         ideal = measure(SERVO.cylinder, state.plant)
-        assert step_measured(SERVO, state, ideal, setpoint, 5.0) == step(SERVO, state, setpoint, 5.0, 0.0)
-        assert step_measured(SERVO, state, ideal, setpoint) == step(SERVO, state, setpoint)
+        assert step(SERVO, state, setpoint, 5.0, measured=ideal) == step(SERVO, state, setpoint, 5.0, 0.0)
+        assert step(SERVO, state, setpoint, measured=ideal) == step(SERVO, state, setpoint)
         assert step(SERVO, state, setpoint)[1].command.force == pytest.approx(
             step(SERVO, state, setpoint, 5.0)[1].command.force - 5.0
         )

@@ -15,9 +15,8 @@ from seal_friction_ros.core.friction.presliding import Presliding
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.servo.closed_loop import Axis, AxisRun
 from seal_friction_ros.core.servo.position_servo import ServoParameters
-from seal_friction_ros.core.tuning.other_plants import on_plants
 from seal_friction_ros.core.tuning.settings import TuningSettings
-from seal_friction_ros.core.tuning.simulated_axis import TuningProblem
+from seal_friction_ros.core.tuning.simulated_axis import TuningProblem, on_plants
 from seal_friction_ros.files import read_yaml
 
 SEAL = replace(parse_seal(read_yaml(ROOT / 'config/seals/ms28775_114.yaml')), presliding=Presliding(stiffness=1e5))

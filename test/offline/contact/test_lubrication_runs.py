@@ -9,9 +9,9 @@ from harness.ehl_cases import COARSE_RING, answer, measured_bag
 from seal_friction_ros.core.foundation.errors import NotConvergedError
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
-from seal_friction_ros.core.lubrication.friction_map import SteadyFriction
+from seal_friction_ros.core.lubrication.friction_map import SteadyFriction, stacked
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, MapGrid
-from seal_friction_ros.core.lubrication.seal_profile import LubricationNumerics
+from seal_friction_ros.core.lubrication.seal_section import LubricationNumerics
 from seal_friction_ros.core.messages.records import Status
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.bags.recorded_run import read_run
@@ -42,7 +42,7 @@ def test_the_error_of_a_map_is_its_change_on_the_next_finer_mesh_or_on_the_coars
         if finer_fails and factor < 1.0:
             raise NotConvergedError('told to')
         rows = [SteadyFriction(p, np.array([2.0, 1.0]), np.ones(2), np.zeros(2), 1e5, 0) for p in (0.0, 1e5)]
-        return runs.table_of([row._replace(friction=factor * row.friction) for row in rows])
+        return stacked(row._replace(friction=factor * row.friction) for row in rows)
 
     monkeypatch.setattr(runs, 'steady_table', table)
     assert runs.run_map(case, 1).mesh_error == pytest.approx(np.full((2, 2), 0.08))
@@ -54,6 +54,12 @@ def test_the_other_meshes_of_a_ring_have_other_elements_and_cells():
     ring = runs.load_case('oring_delft')
     others = [runs.other_mesh(ring, factor) for factor in (0.7, 1.4)]
     assert [(other.oring.numerics.lines, other.numerics.cells) for other in others] == [(23, 448), (46, 896)]
+
+
+def test_the_other_meshes_of_a_case_have_as_many_cells_as_it_may_have():
+    for cells, factor, found in ((32, 0.7, 32), (40, 0.7, 32), (3000, 1.4, 4000)):
+        case = LubricationCase(name='seal', numerics=LubricationNumerics(cells=cells))
+        assert runs.other_mesh(case, factor).numerics.cells == found
 
 
 def test_recording_with_a_mapped_seal_replays_to_the_same_bytes_and_rubs_less_the_faster_it_slides(small, tmp_path):

@@ -7,7 +7,7 @@ from harness.report_page import checked_page
 
 from seal_friction_ros.core.foundation.unknowns import Unknown
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
-from seal_friction_ros.core.lubrication.friction_map import SteadyFriction
+from seal_friction_ros.core.lubrication.friction_map import SteadyFriction, stacked
 from seal_friction_ros.core.lubrication.lubrication_case import parse_lubrication_case
 from seal_friction_ros.offline.contact.lubrication_runs import MapRuns
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty
@@ -34,7 +34,7 @@ def computed_map() -> MapRuns:
         )
         for p, f in zip(pressures, frictions, strict=True)
     ]
-    return MapRuns(CASE, law, rows, 0)
+    return MapRuns(CASE, law, stacked(rows), 0)
 
 
 def test_a_map_shows_friction_by_speed_and_pressure(tmp_path):
@@ -50,11 +50,11 @@ def test_a_map_shows_friction_by_speed_and_pressure(tmp_path):
 def test_a_map_says_where_no_lubricant_gets_under_the_seal_and_where_the_flow_factors_end(tmp_path):
     computed = computed_map()
     for name, changes, words in (
-        ('sealed', {'real_contact': 0.9}, 'above 0.42 no lubricant gets under it'),
-        ('thin', {'thinnest': 0.3}, 'the gap is 0.3 of the roughness'),
+        ('sealed', {'real_contact': np.array([0.1, 0.9])}, 'above 0.42 no lubricant gets under it'),
+        ('thin', {'thinnest': np.array([0.8, 0.3])}, 'the gap is 0.3 of the roughness'),
     ):
-        rows = [*computed.rows[:1], computed.rows[1]._replace(**changes)]
-        report.write_map_page(computed._replace(rows=rows), tmp_path / f'{name}.html')
+        changed = computed._replace(table=computed.table._replace(**changes))
+        report.write_map_page(changed, tmp_path / f'{name}.html')
         assert any(words in text for text in checked_page(tmp_path / f'{name}.html').texts['p.note'])
     assert computed.limits == ''
 

@@ -198,7 +198,7 @@ def test_steps_are_taken_at_once_until_a_loaded_part_comes_to_the_rounded_edge()
     """Two roundings of 20 um before the chamfer from 0.3 to 0.4667 mm, and two after it."""
     model = transient_model(EDGE)
     loads = initial_state(model, -1e-3)
-    solid, _ = transient.asperity_pressure(loads.state.gap, model.contact.asperities)
+    solid, _ = model.contact.asperity_pressure(loads.state.gap)
     loaded = model.place[solid > 0.01 * solid.max()]
     before, after = 0.26e-3 - loaded[-1], 0.3e-3 + 60e-6 / 0.36 + 40e-6 - loaded[0]
 

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from seal_friction_ros.core.lubrication.contact import ContactState, asperity_pressure
+from seal_friction_ros.core.lubrication.contact import ContactState
 from seal_friction_ros.core.lubrication.grease import Grease
 from seal_friction_ros.core.lubrication.model import fluid_force, solid_limit
 from seal_friction_studies.core import transient
@@ -63,7 +63,7 @@ def test_chamfer_pushes_by_the_pressure_on_what_the_wall_falls_below_the_seal(ga
     """Pressure of film and asperities times the height of the step, towards the open side."""
     model = transient_model(EDGE)
     moment = at_rest(EDGE)._replace(position=0.25e-3, lag=-0.05e-3, state=plates(gap, 3e5))
-    solid = asperity_pressure(np.array([gap]), model.contact.asperities)[0][0]
+    solid = model.contact.asperity_pressure(np.array([gap]))[0][0]
     fall, _ = EDGE.control_edge.fall(0.3e-3 + np.array([-0.3e-3, 0.3e-3]))
     assert (solid > 1e4) == (gap < 1e-5)
     exact = -(3e5 + solid) * (fall[1] - fall[0]) * CIRCUMFERENCE
@@ -75,7 +75,7 @@ def test_bottom_of_the_groove_bears_what_film_and_asperities_push_unless_it_has_
     state = plates(2e-6, 3e5)
     rubbing = dataclasses.replace(CASE, groove=GrooveSpring(friction_coefficient=0.15))
     model = transient_model(rubbing)
-    solid = asperity_pressure(state.gap[:1], model.contact.asperities)[0][0]
+    solid = model.contact.asperity_pressure(state.gap[:1])[0][0]
     assert transient._bottom_force(model, state) == pytest.approx((3e5 + solid) * CIRCUMFERENCE * FILM)
     assert transient._bottom_force(transient_model(CASE), state) == 0.0
 
@@ -132,9 +132,9 @@ def test_seal_at_rest_under_air_touches_as_without_it_and_has_crept_under_all_of
     case = dataclasses.replace(CREEPING, air=AirPressure(pressure_left=4e5, pressure_right=0.0))
     model = transient_model(case)
     start = initial_state(model, 0.0)
-    solid, _ = asperity_pressure(start.state.gap, model.contact.asperities)
+    solid, _ = model.contact.asperity_pressure(start.state.gap)
     rigid = model.place**2 / 2e-3 - 60e-6  # 36 um, and 60 um/MPa of 0.4 MPa
-    matrix = model.contact.body.matrix()
+    matrix = model.contact.body.matrix
     assert start.state.gap == pytest.approx(rigid + matrix @ solid, abs=1e-12)
     assert start.state.pressure == pytest.approx(model.ambient)
     assert start.creep == pytest.approx(np.stack([0.375 * matrix @ (solid + model.ambient)] * 2), rel=1e-9)
@@ -154,8 +154,8 @@ def test_seal_gives_way_at_once_by_a_quarter_and_creeps_towards_the_rest():
     model = transient_model(CREEPING)
     start = initial_state(model, 0.0)
     after, *_ = transient_step(model, start, 5e-3, 0.2e-3)
-    solid, _ = asperity_pressure(after.state.gap, model.contact.asperities)
-    deflected = model.contact.body.matrix() @ (after.state.pressure + solid)
+    solid, _ = model.contact.asperity_pressure(after.state.gap)
+    deflected = model.contact.body.matrix @ (after.state.pressure + solid)
     for part, time in enumerate((0.01, 0.1)):
         rate = (after.creep[part] - start.creep[part]) / 5e-3
         assert time * rate == pytest.approx(0.375 * deflected - after.creep[part], rel=1e-6, abs=1e-12)

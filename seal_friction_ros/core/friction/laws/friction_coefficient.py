@@ -4,7 +4,6 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 
-from seal_friction_ros.core.foundation.compiled import Bound, evaluate
 from seal_friction_ros.core.foundation.monotone_table import MonotoneTable
 from seal_friction_ros.core.foundation.parameters import parameter
 from seal_friction_ros.core.friction.laws.law import Law
@@ -47,11 +46,6 @@ class PowerLaw(FrictionCoefficientLaw):
     )
 
 
-def coefficient_table(table: Bound, normal_force: float, _unused: float) -> float:
-    """Interpolated coefficient [-], constant beyond both ends."""
-    return evaluate(table, normal_force, 0.0)
-
-
 @dataclass(frozen=True)
 class CoefficientTable(FrictionCoefficientLaw):
     """Coefficient of friction by monotone interpolation over normal force, constant beyond both ends.
@@ -60,8 +54,6 @@ class CoefficientTable(FrictionCoefficientLaw):
 
     Source: thesis, chapter 7 (mu is "Defined at multiple F_n values") and Figure 18.
     """
-
-    function = staticmethod(coefficient_table)
 
     normal_forces: tuple[float, ...] = parameter(
         unit='N', lower=0.0, upper=1e9, description='Normal forces, increasing.'

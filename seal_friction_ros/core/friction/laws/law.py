@@ -6,7 +6,7 @@ stands. The live node, replay, the servo plant and identification all call it as
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, cast
 
 from seal_friction_ros.core.foundation.compiled import Bound, bound
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, meanings
@@ -17,16 +17,18 @@ class Law(CheckedParameters):
     """Parameters of a law, each a field made by `parameter`, and its function.
 
     A subclass sets ``function``. It takes parameters named after attributes of the record (a number, a tuple of
-    numbers, another law, a table), and then its two arguments.
+    numbers, another law, a table), and then its two arguments. A law that is a ``table`` has the function of that.
     """
 
-    function: ClassVar[Callable[..., float]]
+    function: ClassVar[Callable[..., float] | None] = None
     bound: Bound = dataclasses.field(init=False, repr=False, compare=False)  # the function of the two arguments alone
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self.check_together()
-        object.__setattr__(self, 'bound', bound(type(self).function, self))
+        function = type(self).function
+        made = bound(function, self) if function else cast(Any, self).table.bound
+        object.__setattr__(self, 'bound', made)
 
     def check_together(self) -> None:
         """Check what the bounds of each parameter alone cannot; called once these hold.

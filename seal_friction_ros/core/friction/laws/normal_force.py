@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-from seal_friction_ros.core.foundation.compiled import Bound, evaluate
 from seal_friction_ros.core.foundation.monotone_table import MonotoneTable
 from seal_friction_ros.core.foundation.parameters import parameter
 from seal_friction_ros.core.friction.laws.law import Law
@@ -38,11 +37,6 @@ class AreaDeformationGain(NormalForceLaw):
     radial_force: float = parameter(unit='N', lower=1e-6, upper=1e6, description='F_rad, normal force at no pressure.')
 
 
-def normal_force_table(table: Bound, pressure: float, _projected_area: float) -> float:
-    """Interpolated normal force [N]."""
-    return evaluate(table, pressure, 0.0)
-
-
 @dataclass(frozen=True)
 class NormalForceTable(NormalForceLaw):
     """Normal force by monotone interpolation of computed or measured values over pressure.
@@ -53,8 +47,6 @@ class NormalForceTable(NormalForceLaw):
     ValueError: fewer than two points, or pressures or forces
     that do not increase, or a force that is not positive.
     """
-
-    function = staticmethod(normal_force_table)
 
     pressures: tuple[float, ...] = parameter(
         unit='Pa', lower=0.0, upper=1e9, description='Gauge pressures, increasing.'

@@ -1,40 +1,10 @@
 """What the velocity adds to a law that does not depend on the speed: viscous and Stribeck friction, asymmetry."""
 
 import math
-from dataclasses import asdict, dataclass
-from typing import NamedTuple
+from dataclasses import dataclass
 
 from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
-
-
-@compilable
-def with_velocity_terms(
-    coulomb_friction: float,
-    speed: float,
-    direction: int,
-    viscous_friction: float,
-    stribeck_friction: float,
-    stribeck_velocity: float,
-    asymmetry: float,
-) -> float:
-    """Sliding friction [N]: the equation of `VelocityTerms`."""
-    sliding = coulomb_friction + viscous_friction * speed
-    if stribeck_friction > 0.0:
-        sliding += stribeck_friction * math.exp(-speed / stribeck_velocity)
-    return sliding * (1.0 + asymmetry if direction > 0 else 1.0 - asymmetry)
-
-
-class VelocityTermNumbers(NamedTuple):
-    """`VelocityTerms` as numbers."""
-
-    viscous_friction: float
-    stribeck_friction: float
-    stribeck_velocity: float
-    asymmetry: float
-
-
-NO_VELOCITY_TERMS = VelocityTermNumbers(0.0, 0.0, 1.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -84,7 +54,14 @@ class VelocityTerms(CheckedParameters):
         start=lambda _: 0.0,
     )
 
-    @property
-    def numbers(self) -> VelocityTermNumbers:
-        """The terms as numbers."""
-        return VelocityTermNumbers(**asdict(self))
+
+NO_VELOCITY_TERMS = VelocityTerms()
+
+
+@compilable
+def with_velocity_terms(terms: VelocityTerms, coulomb_friction: float, speed: float, direction: int) -> float:
+    """Sliding friction [N]: the equation of `VelocityTerms`."""
+    sliding = coulomb_friction + terms.viscous_friction * speed
+    if terms.stribeck_friction > 0.0:
+        sliding += terms.stribeck_friction * math.exp(-speed / terms.stribeck_velocity)
+    return sliding * (1.0 + terms.asymmetry if direction > 0 else 1.0 - terms.asymmetry)
