@@ -1,6 +1,7 @@
 """Every bench runs in its shortest form and counts what it should count; no test depends on the times it prints."""
 
 import pytest
+from harness.browser import chromium
 from harness.commands import run_json
 from paths import ROOT
 
@@ -106,6 +107,14 @@ def test_a_fleet_is_timed_by_step_and_number_of_bags():
     assert hour['bytes [MB/h]']['recorded'] > hour['bytes [MB/h]']['inputs'] > 100.0
     assert min(step['time [s/h]'] for step in hour['steps'].values()) > 0.0
     assert {len(rows) for rows in found['bags'].values()} == {1}
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not chromium(), reason='no Chromium')
+def test_large_pages_are_timed_in_a_browser():
+    rows = run_json('bench/pages.py', '--seconds', '4', '--bags', '2', '--times', '1')
+    assert [row['page'] for row in rows] == ['report of 4 s at 1 kHz', 'fleet of 2 bags']
+    assert min(row[name] for row in rows for name in ('size [MB]', 'open [s]', 'zoom [ms]')) > 0.0
 
 
 def test_every_bench_is_run_here():
