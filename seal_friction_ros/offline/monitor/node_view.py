@@ -97,20 +97,19 @@ class NodeView:
     def configure(self, text: str) -> None:
         """Take a configuration, the first one or a changed one; ValueError if it is not valid."""
         snapshot = parse_machine_text(text)
-        self.known = {name: actuator_view.known_of(one) for name, one in snapshot.configurations.items()}
-        self._had_placeholder |= {name for name, one in self.known.items() if one.has_placeholder}
+        known = {name: actuator_view.known_of(one) for name, one in snapshot.configurations.items()}
+        machine, kept = None, _TRACKED if math.isfinite(self._remembered) else math.inf
         if snapshot.file.document is not None:
             machine, _ = machine_of(snapshot, self._definitions_of(snapshot.file.topics.values()))
-            if self._machine is None or machine.file != self._machine.file:
-                self._translation = Translation(machine, init(machine))
-            self._machine = machine
-        else:
-            self._machine = self._translation = None
-        self.held = {name: self.held.get(name, NOTHING_HELD) for name in self.known}
-        kept = _TRACKED if math.isfinite(self._remembered) else math.inf
         for name, one in snapshot.actuators.items():
             follower = TrackingFollower(kept, has_recorded=self._has_recorded)
             self._tracking.setdefault(name, follower).configure(one.snapshot)
+        # Nothing of a configuration that is not valid is kept: all that may refuse it stands above.
+        if machine is None or self._machine is None or machine.file != self._machine.file:
+            self._translation = None if machine is None else Translation(machine, init(machine))
+        self._machine, self.known = machine, known
+        self.held = {name: self.held.get(name, NOTHING_HELD) for name in known}
+        self._had_placeholder |= {name for name, one in known.items() if one.has_placeholder}
         self.refused = ''
 
     def hear(self, received: int) -> None:
