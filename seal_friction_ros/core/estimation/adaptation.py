@@ -62,7 +62,8 @@ REST = 0.1  # [s] after a motion in which the force sum may be that of the motio
 LEAP_AT_REST = 0.3  # [-] sudden change of the force sum at rest over the friction, from which on it may be a load
 AT_ONCE = 2.0  # [-] on the noise of the force sum at rest, which nothing averages
 LONGEST_PRESS = 0.1  # [s] for which a rod may rest under the breakaway force
-MAY_BE_FRICTION = 0.8  # [-] of what readings have added to the offset since the last reversal
+LOADED_TIME = 1.0  # [s] of sliding without a reading over which a sudden change at rest is forgotten
+MAY_BE_FRICTION = 0.8  # [-] of what readings have added to the offset since the last reversal, in the band of sliding
 WAVERING = 0.25  # [-] of the friction: root mean square of a drift that nothing explains,
 LASTING_DRIFT = 0.4  # [-] and that drift just now,
 UNPROVEN_DRIFT = 0.2  # [-] or this before the motion has told the friction
@@ -140,11 +141,13 @@ class Rest(NamedTuple):
     slid: int = NEVER  # [ns] stamp of the last sample of a sliding rod
     ripple: float = 0.0  # [N^2] mean square of the force sum against its lagging value, over `SHORT_TIME`
     pressed: float = 0.0  # [s] of this rest under the breakaway force, in all
-    leapt: float = 0.0  # [N^2] square of the largest sudden change of the force sum in this rest
+    leapt: float = 0.0  # [N] largest sudden change of the force sum in this rest
     leapt_at: int = NEVER  # [ns] its stamp
-    loaded: float = 0.0  # [N^2] `leapt` once the rod has rested on, until the next reading: it may be a load
+    loaded: float = 0.0  # [N] a sudden change within a rest, until the next reading: it may be a load
     held: float = 0.0  # [N] most that rests held beyond the sliding friction, which fades over `USUAL_TIME`
 
+
+NO_REST = Rest()
 
 ANY = 1e300  # [N] innovation that nothing is beyond, before the first reading
 
@@ -198,7 +201,7 @@ NOT_ADAPTED = AdaptationState(
     filter=NOT_BEGUN,
     by_motion=NOT_BEGUN,
     strokes=Strokes(),
-    rest=Rest(),
+    rest=NO_REST,
     outlook=NO_OUTLOOK,
 )
 """State before the first sample."""
@@ -273,7 +276,8 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
             if is_outlier:
                 known = disregarded(known, reading, elapsed)
             elif slide.is_identified:
-                known, way, rest = updated(known, reading), 0.0, replace(rest, loaded=0.0)
+                known, way = updated(known, reading), 0.0
+                rest = replace(rest, loaded=0.0) if fastest >= slide.slow else rest
     outlook = outlook_of(settings, known, way, bias, acceleration, may_rest)
     by_motion = known if fastest >= slide.slow else by_motion
     return AdaptationState(
@@ -284,7 +288,7 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
 @compilable
 def _interrupted(settings: AdaptationSettings, state: AdaptationState, stamp: int, newest: Lagging) -> AdaptationState:
     """State after a gap: signals and strokes begin anew."""
-    known, way, rest = state.filter, state.way, Rest(stamp, 0.0, 0.0, 0.0, NEVER, 0.0, state.rest.held)
+    known, way, rest = state.filter, state.way, replace(NO_REST, slid=stamp, held=state.rest.held)
     strokes = Strokes(NO_STROKE, NO_STROKE, state.strokes.ratio, state.strokes.reversals)
     outlook = outlook_of(settings, known, way, 0.0, 0.0, False)
     return AdaptationState(
@@ -308,17 +312,20 @@ def _rested(settings: AdaptationSettings, state: AdaptationState, slide: Slide, 
     ripple = before.ripple + elapsed / (elapsed + SHORT_TIME) * (change * change - before.ripple)
     held = before.held * (1.0 - elapsed / USUAL_TIME)
     if direction != 0:
-        return Rest(slide.stamp, ripple, 0.0, 0.0, NEVER, before.loaded, held)
+        loaded = before.loaded * (1.0 - elapsed / LOADED_TIME)
+        return replace(NO_REST, slid=slide.stamp, ripple=ripple, loaded=loaded, held=held)
     beyond = abs(slide.force_sum - outlook.offset) - outlook.scale * slide.friction
     most = (settings.scale_max - outlook.scale) * slide.friction
     if slide.is_usable and outlook.is_proven and beyond > held and (slide.stamp - before.slid) * 1e-9 >= REST:
         held = beyond if beyond < most else most  # more is an end stop
     pressed = before.pressed + elapsed if slide.is_pressed else before.pressed
     leapt, leapt_at, loaded = before.leapt, before.leapt_at, before.loaded
-    if leapt > loaded and (slide.stamp - leapt_at) * 1e-9 >= REST:
-        loaded = leapt
-    if abs(leap) > LEAP_AT_REST * slide.friction and leap * leap > leapt:
-        leapt, leapt_at = leap * leap, slide.stamp
+    is_of_motion = leapt_at == NEVER or (leapt_at - before.slid) * 1e-9 < REST  # of the end of the motion before
+    if not is_of_motion and (slide.stamp - leapt_at) * 1e-9 >= REST and abs(leapt) > abs(loaded):
+        loaded = leapt  # and not of the beginning of the next
+    is_larger = abs(leap) > abs(leapt) or (is_of_motion and (slide.stamp - before.slid) * 1e-9 >= REST)
+    if slide.is_usable and is_larger and abs(leap) > LEAP_AT_REST * slide.friction:
+        leapt, leapt_at = leap, slide.stamp
     return Rest(before.slid, ripple, pressed, leapt, leapt_at, loaded, held)
 
 
@@ -577,7 +584,7 @@ def _std_of_sliding(state: AdaptationState, speed: float, law: float, file_std: 
 def _unexplained_square(known: FrictionFilter) -> float:
     """Square of what readings show beside the friction and may be friction, beyond a usual drift [N^2].
 
-    That is what the offset took since the last reversal and the drift just now, or all that is not explained.
+    That is most of what the offset took since the last reversal and the drift just now, or all that is not explained.
     """
     unexplained = known.unexplained
     newest = unexplained.drift + MAY_BE_FRICTION * known.strayed
@@ -597,7 +604,8 @@ def _std_at_rest(state: AdaptationState, stamp: int, force_sum: float, most: flo
     offset = spread.bb + way * (2.0 * spread.bg + way * spread.gg)
     remainder = known.terms.remainder  # at rest nothing tells it from the offset
     step = known.outliers.last if known.outliers.number != 0 else 0.0  # it may have begun
-    variance = offset + remainder * remainder + known.strayed * known.strayed + rest.leapt + step * step
+    strayed = known.strayed + way * (known.terms.gradient - known.gradient)
+    variance = offset + remainder * remainder + strayed * strayed + rest.leapt * rest.leapt + step * step
     variance += AT_ONCE * AT_ONCE * (known.unexplained.square + noise)
     std = math.sqrt(variance) if variance > 0.0 else 0.0
     return std if std < most else most

@@ -69,7 +69,7 @@ LEAP = 3.0  # [-] innovations over their deviation within two readings, or at th
 STEP_READINGS = 10  # outliers in a row to one side that make it one,
 FEWEST_OUTLIERS = 3  # or these before the rod turns
 STEP_OF_FRICTION = 0.5  # [-] standard deviation of the scale over that of the offset after a step, both as forces
-LOADED = 2.0  # [-] squared innovation over the squared leap at rest, up to which that explains it as a load
+LOADED = 2.0  # [-] squared innovation over the squared change at rest up to which that is its cause: lags take a part
 PROVEN = 0.25  # [-] share: standard deviation of the friction below which the motion has told it
 DRIFT_TIME = 0.08  # [s] over which white noise averages out of what is not explained
 DRIFT_MEMORY = 10.0  # [s] over which the size of the rest is known
@@ -200,7 +200,7 @@ class Reading(NamedTuple):
     way: float  # [m] from the reading before to this one
     friction: float  # [N] f of the law, > 0
     friction_std: float  # [N] of a new reading, by the seal file
-    loaded: float = 0.0  # [N^2] square of a sudden change of the force sum in the rest before: it may be a load
+    loaded: float = 0.0  # [N] sudden change of the force sum in the rest before: it may be a load
 
 
 @compilable
@@ -323,16 +323,16 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
     spread = expected(gains, reading)
     variance = spread + noise * noise
     surprise = innovation * innovation
-    if OUTLIER * OUTLIER * variance < surprise < LOADED * reading.loaded:
+    is_load = innovation * reading.loaded > 0.0 and surprise < LOADED * reading.loaded * reading.loaded
+    if is_load and surprise > OUTLIER * OUTLIER * variance:
         covariance = replace(covariance, bb=covariance.bb + surprise)
         gains = _gains(covariance, reading)
         spread = expected(gains, reading)
-        variance = spread + noise * noise
-
-    outliers, steps = _outliers(known, reading.direction, terms, innovation, variance)
-    unexplained = _followed(
-        known, reading.friction, innovation + terms.remainder, innovation * innovation / variance, moved
-    )
+        outliers, steps, left = replace(known.outliers, number=0), False, 0.0
+    else:
+        outliers, steps = _outliers(known, reading.direction, terms, innovation, variance)
+        left = innovation
+    unexplained = _followed(known, reading.friction, left + terms.remainder, left * left / variance, moved)
     if steps:
         terms = outliers.settled
         innovation = reading.force - expected(terms, reading)

@@ -230,6 +230,64 @@ def test_a_slow_rod_that_was_fast_may_be_at_rest_so_its_outliers_are_not_learnt_
     assert creeping.outlook.most < 0.0
 
 
+def loaded_at_rest(load, when=0.5, since=0.0, seconds=1.5):
+    """A rod that was taught and rests; a load [N] comes ``when`` [s] after the motion has ended."""
+    taught = adapted(strokes(10.0, friction=40.0))
+    rest = moving(
+        seconds, lambda _: 0.0, lambda time: load if since + when <= time else 0.0, taught.stamp + SECOND // 100
+    )
+    return adapted(rest, state=taught)
+
+
+def stroke_with(state, force, seconds=0.5, velocity=0.02, **changes):
+    """The next stroke, after ``state``."""
+    slides = moving(seconds, lambda _: velocity, lambda _: force, state.stamp + SECOND // 100, **changes)
+    return adapted(slides, state=state)
+
+
+@pytest.mark.parametrize('load', [-40.0, 40.0, 80.0])
+def test_a_load_that_comes_at_rest_is_no_friction_of_the_next_stroke(load):
+    found = stroke_with(loaded_at_rest(load), 40.0 + load)
+    assert learnt(found).offset == pytest.approx(load, abs=3.0)
+    assert learnt(found).scale == pytest.approx(1.0, abs=0.05)
+    assert found.outlook.status == 0
+    assert found.rest.loaded == 0.0  # it is told once
+
+
+@pytest.mark.parametrize(
+    'rested',
+    [
+        loaded_at_rest(40.0, when=0.02),  # the end of the motion before
+        loaded_at_rest(40.0, when=1.45),  # the beginning of the next
+        loaded_at_rest(-40.0),  # to the other side
+        loaded_at_rest(15.0),  # too small for it
+        stroke_with(loaded_at_rest(40.0), 0.0, seconds=5.0, is_usable=False),  # long forgotten
+    ],
+)
+def test_a_sudden_force_sum_is_no_load_at_once_if_the_rest_does_not_explain_it(rested):
+    """Then it is a step as any other, which is doubted until the next reversal."""
+    found = stroke_with(rested, 80.0)
+    assert found.filter.outliers.is_stepped
+    assert found.outlook.status != 0
+
+
+def test_a_slow_motion_that_is_forgotten_does_not_forget_the_load_of_the_rest_before():
+    crept = adapted(moving(2.0, lambda time: 0.002 * (1 - 2 * (int(time) % 2)), lambda _: 0.0))
+    rest = moving(1.5, lambda _: 0.0, lambda time: 40.0 * (time > 0.5), crept.stamp + SECOND // 100)
+    slow = stroke_with(adapted(rest, state=crept), 80.0, velocity=0.002)
+    assert 20.0 < slow.rest.loaded <= 40.0  # it fades while the rod slides
+
+
+def test_a_step_that_has_begun_when_the_rod_comes_to_rest_is_in_the_deviation_there():
+    taught = adapted(strokes(10.0, friction=40.0))
+    begun = stroke_with(taught, 80.0, seconds=0.09)
+    assert begun.filter.outliers.number > 0
+    rested = adapted(moving(1.0, lambda _: 0.0, lambda _: 0.0, begun.stamp + SECOND // 100), state=begun)
+    by_file = ActuatorFriction(40.0, 2.0, 60.0, True, 0.0, 0.0)
+    _, std, _ = friction_at_rest(SETTINGS, rested, by_file, rested.stamp, 0.0, True)
+    assert BAND_95 * std > 40.0
+
+
 def std_at(state, speed):
     """Standard deviation of the friction of 40 N of a rod that slides [N]."""
     by_file = ActuatorFriction(40.0, 2.0, 0.0, True, 0.0, 0.0)

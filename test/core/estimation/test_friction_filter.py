@@ -432,7 +432,7 @@ def test_a_load_that_came_at_rest_is_no_friction_at_the_next_reversal(share):
     law = machine.frictions[0]
     state, loaded = after(readings(machine, start)), machine._replace(terms=LAW._replace(offset=share * law))
     first, *others = (one for one in readings(loaded, start + 1.0) if one.stamp >= start * SECOND)
-    for reading in (first._replace(loaded=(share * law) ** 2), *others):
+    for reading in (first._replace(loaded=share * law), *others):
         state = updated(state, reading)
         assert magnitude(state, machine, reading.direction) == pytest.approx(law, rel=0.1)
         assert not state.outliers.is_stepped
@@ -443,7 +443,7 @@ def test_a_change_of_the_force_sum_at_rest_is_no_load_if_the_next_motion_needs_n
     machine, start = Machine(), 20.0
     state = after(readings(machine, start))
     first = next(one for one in readings(machine, start + 1.0) if one.stamp >= start * SECOND)
-    assert updated(state, first._replace(loaded=machine.frictions[0] ** 2)) == updated(state, first)
+    assert updated(state, first._replace(loaded=machine.frictions[0])) == updated(state, first)
 
 
 def test_noise_of_the_force_sum_is_no_uncertainty_of_the_friction():
