@@ -239,6 +239,15 @@ def test_the_folder_makes_the_examples_and_both_answer_what_python_computes(expo
         assert np.array_equal(log[name], replayed[name]), name
 
 
+def test_make_fails_where_the_examples_answer_differently(exported: Path, tmp_path: Path):
+    folder = shutil.copytree(exported, tmp_path / 'copy')
+    source = folder / 'example.c'
+    source.write_text(source.read_text().replace('feed_forward.force : 0.0', 'feed_forward.force : 1.0'))
+    run = subprocess.run(['make', '-s'], cwd=folder, capture_output=True, text=True, check=False)
+    assert run.returncode != 0
+    assert 'differ' in run.stdout + run.stderr
+
+
 def test_a_log_is_verified_by_the_configuration_of_the_export_after_its_seal_file_changed(tmp_path: Path):
     seal, folder = tmp_path / 'rod.yaml', tmp_path / 'friction_c'
     shutil.copy(ROOT / 'config' / 'seals' / 'ms28775_114_prior_art.yaml', seal)
