@@ -318,6 +318,9 @@ def test_a_library_named_like_a_module_compiles_with_all_warnings_but_not_to_ina
     subprocess.run(check, cwd=tmp_path, check=True)
     refused = subprocess.run([*check, '-ffinite-math-only'], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert '#error' in refused.stderr
+    for_others = [*check[:-1], '-E', '-U__GNUC__', 'pipeline.c']  # a compiler that has no pragma of its own
+    kept = subprocess.run(for_others, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    assert '#pragma STDC FP_CONTRACT OFF' in kept
     assert 'an answer counts if its has_ is true' in made['pipeline.h']
     fused = ['-mfma'] if platform.machine() == 'x86_64' else []  # others have fused operations by default
     subprocess.run(['cc', '-std=gnu17', '-O2', *fused, '-S', 'pipeline.c'], cwd=tmp_path, check=True)
