@@ -23,6 +23,7 @@ from seal_friction_ros.core.estimation.configuration import first_snapshot, pars
 from seal_friction_ros.core.estimation.loop import LoopSample, RodLoad, friction_on_rod, receive_sample
 from seal_friction_ros.core.estimation.pipeline import answered, init, is_tick_due
 from seal_friction_ros.core.friction.states import StateFriction
+from seal_friction_ros.core.friction.temperature import COLDEST, HOTTEST
 from seal_friction_ros.core.messages.coder import decode, encode, type_of
 from seal_friction_ros.core.messages.records import (
     Clock,
@@ -156,6 +157,7 @@ def test_a_hostile_integrator_of_two_libraries_in_threads_finds_nothing(sanitize
     assert (run.returncode, run.stderr) == (0, '')
 
 
+TEMPERATURES = (COLDEST - 1.0, COLDEST + 1.0, HOTTEST - 1.0, HOTTEST + 1.0)  # [K]
 GARBAGE = (math.nan, math.inf, -math.inf, 0.0, -0.0, 5e-324, -5e-324, 2e-308, 1e308, -1e308, 1e154, -3e6)
 
 
@@ -360,6 +362,15 @@ class Odd(NamedTuple):
     """A record."""
 
     force: float  # [N] `a*/b`
+
+
+def test_the_load_of_a_rod_tells_which_temperature_counts():
+    assert f'not {COLDEST:g} to {HOTTEST:g} K' in meanings_of(RodLoad)['temperature']
+    scaled = with_seals(ACTUATORS['others']).estimator
+    assert scaled.has_temperature_scale
+    at = {kelvin: friction_on_rod(scaled, RodLoad(0.05, 3e6, 1e6, 0.0, kelvin - 273.15)) for kelvin in TEMPERATURES}
+    of_file = friction_on_rod(scaled, RodLoad(0.05, 3e6, 1e6))
+    assert [kelvin for kelvin in TEMPERATURES if at[kelvin] == of_file] == [COLDEST - 1.0, HOTTEST + 1.0]
 
 
 def test_a_comment_of_a_member_stays_a_comment_in_c():
