@@ -12,9 +12,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import fmpy
 import numpy as np
 import pytest
-from fmpy import extract, simulate_fmu
+from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from fmpy.validation import validate_fmu
@@ -137,9 +138,11 @@ def test_garbage_makes_no_garbage_and_a_reset_instance_is_a_new_one(exported):
         for of_garbage, of_samples in pairs:
             assert np.all(np.isfinite(of_garbage))
             alone.append(of_samples)
+        velocity, before = variables['velocity'].valueReference, got(bad, variables, ['velocity', *outputs])
         for reference in (99, variables[outputs[0]].valueReference):  # of nothing, and of an output
             with pytest.raises(FMICallException):
-                (bad.setReal if isinstance(bad, FMU2Slave) else bad.setFloat64)([reference], [1.0])
+                (bad.setReal if isinstance(bad, FMU2Slave) else bad.setFloat64)([velocity, reference], [0.123, 1.0])
+            assert np.array_equal(got(bad, variables, ['velocity', *outputs]), before, equal_nan=True)
         bad.reset()
         assert list(ran(bad, variables, given, times)) == alone
 
@@ -153,6 +156,19 @@ def test_the_sources_in_the_fmu_build_with_clang_without_a_warning(exported):
         )
         assert (made.returncode, made.stderr) == (0, '')
         assert (folder / f'{file.stem}.o').stat().st_size > 0
+    symbols = subprocess.run(['nm', 'fmu.o'], cwd=folder, capture_output=True, text=True, check=True).stdout
+    assert ('friction_on_rod' in symbols) == (exported[0] == 'friction')  # the estimator computes none of a plant
+
+
+def test_the_functions_of_the_fmu_are_those_of_the_headers_of_the_standard(exported):
+    folder, headers = Path(extract(exported[1])) / 'sources', Path(fmpy.__file__).with_name('c-code')
+    header = f'fmi{read_model_description(exported[1]).fmiVersion[0]}Functions.h'
+    flags = ['-std=c11', '-O0', '-Wall', '-Wextra', '-Werror', '-I', str(headers), '-include', header, '-c']
+    made = subprocess.run(['cc', *flags, 'fmu.c'], cwd=folder, capture_output=True, text=True, check=False)
+    assert (made.returncode, made.stderr) == (0, '')  # a function of other parameters is an error
+    symbols = subprocess.run(['nm', 'fmu.o'], cwd=folder, capture_output=True, text=True, check=True).stdout
+    declared = re.findall(r'fmi\d\w+TYPE\s+(fmi\d\w+);', (headers / header).read_text())
+    assert set(re.findall(r' T (\w+)', symbols)) == set(declared)
 
 
 DRIVER = """

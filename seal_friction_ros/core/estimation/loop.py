@@ -50,15 +50,16 @@ class RodLoad(NamedTuple):
     pressure_a: float  # [Pa, gauge]
     pressure_b: float  # [Pa, gauge]
     force_sum: float = 0.0  # [N] every axial force on the moving mass except seal friction; counts at rest only
-    temperature: float = math.nan  # [degC] of the seals; NaN: that of the seal file
+    temperature: float = math.nan  # [degC] of the seals; NaN, or not 150 to 600 K: that of the seal file
 
 
 def friction_on_rod(parameters: EstimatorParameters, load: RodLoad) -> StateFriction:
     """Friction of the seals on a rod by the seal files, without adaptation and elasticity: `states.state_friction`.
 
     The rod rests at a speed of ``stick_velocity`` and below; a plant that never rests may set that to 0. Velocity and
-    pressures count up to ``velocity_max``, ``pressure_min`` and ``pressure_max``; a temperature that no rubber seal has
-    is not known. The state is UNKNOWN and the force 0 N where another number is not finite.
+    pressures count up to ``velocity_max``, ``pressure_min`` and ``pressure_max``; a temperature outside 150 to 600 K is
+    that of the seal file. No status tells of these limits. The state is UNKNOWN and the force 0 N where another number
+    is not finite.
     """
     if not math.isfinite(load.velocity + load.pressure_a + load.pressure_b + load.force_sum):
         return StateFriction(UNKNOWN, 0, 0.0)

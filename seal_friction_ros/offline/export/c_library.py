@@ -1,7 +1,7 @@
 """``seal_friction export c``: the estimator as C, with one header, for a control loop without Python.
 
-The folder has the sources, ``configuration.json`` (seal files and settings), a Makefile, an example in C and C++,
-and its samples. Messages and state are structs of the records of Python.
+The folder has the sources, ``configuration.json`` (seal files and settings), a Makefile, two examples and their
+samples. Messages and state are structs of the records of Python.
 """
 
 import hashlib
@@ -126,7 +126,9 @@ def sources(parameters: pipeline.PipelineParameters, document: str, name: str) -
         }  # fmt: skip
     except UntranslatableError as error:
         raise ValueError(f'no C for this configuration: {error}') from None
-    files = {f'{name}.h': 'library.h', f'{name}.c': 'library.c', 'Makefile': 'Makefile', 'example.c': 'example.c'}
+    files = {f'{name}.h': 'library.h', f'{name}.c': 'library.c'} | {
+        x: x for x in ('Makefile', 'example.c', 'example.cpp')
+    }
     made = {file: filled(template, values) for file, template in files.items()}
     return made | {'configuration.json': document}
 

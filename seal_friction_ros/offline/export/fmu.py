@@ -24,8 +24,7 @@ from seal_friction_ros.offline.export.c_types import fields_of, meanings_of, num
 PLATFORMS = {('2', 'x86_64'): 'linux64', ('3', 'x86_64'): 'x86_64-linux', ('3', 'aarch64'): 'aarch64-linux'}
 """FMI version and machine -> folder of the binary; no binary for others."""
 
-
-TAGS = {'2': {float: 'Real', int: 'Integer'}, '3': {float: 'Float64', int: 'Int64'}}
+_TAGS = {'2': {float: 'Real', int: 'Integer'}, '3': {float: 'Float64', int: 'Int64'}}
 """FMI version -> its name of the kind of a variable."""
 
 
@@ -107,7 +106,7 @@ def _source(model: str, fmi: str, name: str) -> str:
         places[each.kind] += f'    case {reference}: return &self->{each.place};\n'
     return filled('fmu.c', {
         'name': name, 'fmi': fmi, 'is_estimator': str(int(model == 'estimator')), 'inputs': str(len(inputs)),
-        'real': TAGS[fmi][float], 'integer': TAGS[fmi][int], 'reals': places[float], 'integers': places[int],
+        'real': _TAGS[fmi][float], 'integer': _TAGS[fmi][int], 'reals': places[float], 'integers': places[int],
         'starts': ' '.join(f'self->{each.place} = {number(each.start)};' for each in inputs),
         'flag': 'int' if fmi == '2' else 'bool', 'integer_type': 'int' if fmi == '2' else 'int64_t',
     })  # fmt: skip
@@ -158,7 +157,7 @@ def _description(model: str, fmi: str, name: str, token: str) -> str:
 
 
 def _variable(fmi: str, reference: int, each: Variable) -> str:
-    variability, tag = 'continuous' if each.kind is float else 'discrete', TAGS[fmi][each.kind]
+    variability, tag = 'continuous' if each.kind is float else 'discrete', _TAGS[fmi][each.kind]
     start = f' start="{str(each.start).replace("nan", "NaN")}"' if each.causality == 'input' else ''
     given = f'name="{each.name}" valueReference="{reference}" causality="{each.causality}" variability="{variability}"'
     given += f' description={quoteattr(each.meaning)}' if each.meaning else ''

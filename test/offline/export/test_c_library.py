@@ -23,6 +23,7 @@ from seal_friction_ros.core.estimation.configuration import first_snapshot, pars
 from seal_friction_ros.core.estimation.loop import LoopSample, RodLoad, friction_on_rod, receive_sample
 from seal_friction_ros.core.estimation.pipeline import answered, init, is_tick_due
 from seal_friction_ros.core.friction.states import StateFriction
+from seal_friction_ros.core.friction.temperature import COLDEST, HOTTEST
 from seal_friction_ros.core.messages.coder import decode, encode, type_of
 from seal_friction_ros.core.messages.records import (
     Clock,
@@ -38,8 +39,9 @@ from seal_friction_ros.core.messages.records import (
 )
 from seal_friction_ros.offline.bags.actuator_bag import open_actuator
 from seal_friction_ros.offline.commands.main import main
+from seal_friction_ros.offline.export import c_library
 from seal_friction_ros.offline.export.c_library import digest, example_samples, sources
-from seal_friction_ros.offline.export.c_types import meanings_of
+from seal_friction_ros.offline.export.c_types import fields_of, meanings_of
 from seal_friction_ros.offline.replay.replay import Replay
 
 BAGS = ('pull_test', 'faults')
@@ -121,7 +123,9 @@ def test_a_step_of_a_loop_is_that_of_python(fresh: CEstimator):
     assert repr(fresh.known()) == repr(state)
 
 
-def test_a_saved_state_goes_on_in_another_process_and_another_configuration_refuses_it(fresh: CEstimator):
+def test_a_saved_state_goes_on_after_a_reset_and_a_library_of_another_layout_refuses_it(
+    fresh: CEstimator, tmp_path: Path, monkeypatch
+):
     for message, *times in sampled(300, 3):
         fresh.receive(message, *times)
     saved, before = (ctypes.c_uint8 * (8 + 8 * len(list(numbers_in(fresh.known())))))(), repr(fresh.known())
@@ -130,7 +134,13 @@ def test_a_saved_state_goes_on_in_another_process_and_another_configuration_refu
     assert repr(fresh.known()) == repr(init(DEFAULT))
     assert fresh.call('load', saved, returns=ctypes.c_bool)
     assert repr(fresh.known()) == before
-    assert repr(fresh.known()) == before
+    monkeypatch.setattr(c_library, 'fields_of', lambda kind: dict(reversed(fields_of(kind).items())))
+    other = CEstimator(DEFAULT, tmp_path)  # the same configuration, whose saved numbers stand in another order
+    before = repr(other.known())
+    assert not other.call('load', saved, returns=ctypes.c_bool)
+    assert repr(other.known()) == before
+    other.call('save', own := type(saved)())
+    assert other.call('load', own, returns=ctypes.c_bool)
 
 
 @pytest.mark.parametrize('sanitizers', ['address,undefined,float-cast-overflow', 'thread'])
@@ -147,6 +157,7 @@ def test_a_hostile_integrator_of_two_libraries_in_threads_finds_nothing(sanitize
     assert (run.returncode, run.stderr) == (0, '')
 
 
+TEMPERATURES = (COLDEST - 1.0, COLDEST + 1.0, HOTTEST - 1.0, HOTTEST + 1.0)  # [K]
 GARBAGE = (math.nan, math.inf, -math.inf, 0.0, -0.0, 5e-324, -5e-324, 2e-308, 1e308, -1e308, 1e154, -3e6)
 
 
@@ -239,6 +250,15 @@ def test_the_folder_makes_the_examples_and_both_answer_what_python_computes(expo
         assert np.array_equal(log[name], replayed[name]), name
 
 
+def test_make_fails_where_the_examples_answer_differently(exported: Path, tmp_path: Path):
+    folder = shutil.copytree(exported, tmp_path / 'copy')
+    source = folder / 'example.c'
+    source.write_text(source.read_text().replace('feed_forward.force : 0.0', 'feed_forward.force : 1.0'))
+    run = subprocess.run(['make', '-s'], cwd=folder, capture_output=True, text=True, check=False)
+    assert run.returncode != 0
+    assert 'differ' in run.stdout + run.stderr
+
+
 def test_a_log_is_verified_by_the_configuration_of_the_export_after_its_seal_file_changed(tmp_path: Path):
     seal, folder = tmp_path / 'rod.yaml', tmp_path / 'friction_c'
     shutil.copy(ROOT / 'config' / 'seals' / 'ms28775_114_prior_art.yaml', seal)
@@ -309,6 +329,9 @@ def test_a_library_named_like_a_module_compiles_with_all_warnings_but_not_to_ina
     subprocess.run(check, cwd=tmp_path, check=True)
     refused = subprocess.run([*check, '-ffinite-math-only'], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert '#error' in refused.stderr
+    for_others = [*check[:-1], '-E', '-U__GNUC__', 'pipeline.c']  # a compiler that has no pragma of its own
+    kept = subprocess.run(for_others, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    assert '#pragma STDC FP_CONTRACT OFF' in kept
     assert 'an answer counts if its has_ is true' in made['pipeline.h']
     fused = ['-mfma'] if platform.machine() == 'x86_64' else []  # others have fused operations by default
     subprocess.run(['cc', '-std=gnu17', '-O2', *fused, '-S', 'pipeline.c'], cwd=tmp_path, check=True)
@@ -339,6 +362,15 @@ class Odd(NamedTuple):
     """A record."""
 
     force: float  # [N] `a*/b`
+
+
+def test_the_load_of_a_rod_tells_which_temperature_counts():
+    assert f'not {COLDEST:g} to {HOTTEST:g} K' in meanings_of(RodLoad)['temperature']
+    scaled = with_seals(ACTUATORS['others']).estimator
+    assert scaled.has_temperature_scale
+    at = {kelvin: friction_on_rod(scaled, RodLoad(0.05, 3e6, 1e6, 0.0, kelvin - 273.15)) for kelvin in TEMPERATURES}
+    of_file = friction_on_rod(scaled, RodLoad(0.05, 3e6, 1e6))
+    assert [kelvin for kelvin in TEMPERATURES if at[kelvin] == of_file] == [COLDEST - 1.0, HOTTEST + 1.0]
 
 
 def test_a_comment_of_a_member_stays_a_comment_in_c():

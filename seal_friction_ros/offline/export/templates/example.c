@@ -1,4 +1,4 @@
-/* ${mark}: samples of a CSV in, estimate and feed-forward out, to the last bit. C and C++.
+/* ${mark}: samples of a CSV in, estimate and feed-forward out, to the last bit.
  * Columns: stamp [ns], then the other members of ${name}_loop_sample in their order; an empty field or nan: no sample. */
 #include "${name}.h"
 #include <inttypes.h>

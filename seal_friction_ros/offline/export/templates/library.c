@@ -6,10 +6,10 @@
 #if FLT_EVAL_METHOD != 0 || defined(__FAST_MATH__) || __FINITE_MATH_ONLY__
 #error "double must be IEEE double precision, without -ffast-math and -ffinite-math-only"
 #endif
-#ifdef __clang__
-#pragma STDC FP_CONTRACT OFF
-#elif defined(__GNUC__)
+#if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("fp-contract=off")
+#else
+#pragma STDC FP_CONTRACT OFF
 #endif
 #ifdef __GNUC__ /* what no branch of this configuration reads */
 #pragma GCC diagnostic ignored "-Wunused-function"
