@@ -27,7 +27,6 @@ from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.executor import run_tool
 from seal_friction_ros.nodes.graph_watch import full_name
 from seal_friction_ros.nodes.managed_node import message_class
-from seal_friction_ros.offline.bags.bag import BagError, BagWriter
 
 SUCCESS, REFUSED = 0, 1
 _NAME = 'seal_friction_topics'
@@ -140,6 +139,8 @@ class Tool:
 
         It ends ``seconds`` [s] after the first message. BagError: there is none, or the bag cannot be written.
         """
+        from seal_friction_ros.offline.bags.bag import BagError, BagWriter  # noqa: PLC0415  no other action needs bags
+
         messages: list[tuple[str, str, int, bytes]] = []
         topics: set[str] = set()
 
@@ -156,7 +157,7 @@ class Tool:
             return bool(messages)
 
         if not self.spin(self._wait, has_heard):
-            heard = ', '.join(f'{topic} ({kind})' for topic, kind in self.topics().items())
+            heard = ', '.join(f'{topic} ({", ".join(kinds)})' for topic, kinds in self.node.get_topic_names_and_types())
             hint = 'start the drivers, check ROS_DOMAIN_ID'
             there = f'topics: {heard or "none"}; silent: {"; ".join(self.silent(topics)) or "none"}'
             raise BagError(f'no message of a type that can be an input within {self._wait:g} s: {hint}; {there}')

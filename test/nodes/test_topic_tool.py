@@ -157,6 +157,11 @@ def test_every_command_of_the_docs_runs(tool, tmp_path, monkeypatch):
     assert 'success: true' in said
 
 
+def test_no_action_but_recording_loads_what_reads_and_writes_bags():
+    program = "import sys, seal_friction_ros.nodes.topic_tool; print([one for one in sys.modules if '.bags' in one])"
+    assert subprocess.run([sys.executable, '-c', program], capture_output=True, check=True).stdout == b'[]\n'
+
+
 def test_fields_are_set_by_name_and_of_their_type():
     assert filled(SetBool.Request(), {'data': True}).data is True
     with pytest.raises(ValueError, match='has no field date: did you mean data'):

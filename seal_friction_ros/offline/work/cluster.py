@@ -86,8 +86,9 @@ def completed_on(
                 numbers[future] = waiting.pop()
                 done.add(future)
             with done.thread_condition:
-                is_done = done.has_ready() or done.thread_condition.wait(_LOOK_PERIOD)
-            if not is_done:
+                if not done.has_ready():
+                    done.thread_condition.wait(_LOOK_PERIOD)
+            if not done.has_ready():  # also after a notification of a call that was taken before it came
                 lonely_since = _lonely_since(client, lonely_since)
                 continue
             future = next(done)

@@ -1,7 +1,8 @@
-"""Inputs of a command: paths, and URLs of fsspec, which are copied to the computer that reads them while it reads.
+"""Inputs of a command: paths, URLs of fsspec, and the bags of a folder or of a list.
 
-fsspec is loaded by the first URL, never before. What speaks a protocol is the user's: ``s3://`` needs the package s3fs
-where the bag is read, and its credentials there.
+What a URL names is copied to the computer that reads it, while it reads. fsspec is loaded by the first URL, never
+before. What speaks a protocol is the user's: ``s3://`` needs the package s3fs where the bag is read, and its
+credentials there.
 """
 
 import hashlib

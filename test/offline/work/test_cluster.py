@@ -6,8 +6,10 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -21,9 +23,10 @@ from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.replay import replay as replay_module
 from seal_friction_ros.offline.replay.replay import replay
 from seal_friction_ros.offline.replay.shared_replay import verify_stretches
-from seal_friction_ros.offline.work.cluster import Cluster
+from seal_friction_ros.offline.work.cluster import Cluster, completed_on
+from seal_friction_ros.offline.work.outcome import Outcome
 
-pytest.importorskip('distributed')
+distributed = pytest.importorskip('distributed')
 COMMAND = [sys.executable, '-m', 'seal_friction_ros']
 CASE = """name: tiny
 motion: {cycles: 1}
@@ -211,6 +214,25 @@ def test_of_calls_for_one_result_the_first_error_counts_and_a_bug_is_seen(cluste
     assert "KeyError: 'a bug'" in errors
     several = "[partial(calls.fail, f'no {number}') for number in range(1, 50)]"
     assert done(*program(f"run_all('all', {several}, workers)", cluster.address, tmp_path)) == (1, '', 'no 1\n')
+
+
+def test_a_notification_of_a_call_that_was_taken_before_does_not_lead_into_the_wait_of_dask(cluster, monkeypatch):
+    class NotifiedLate(distributed.as_completed):
+        """Each wait ends as if notified, soon."""
+
+        def __init__(self, **options):
+            super().__init__(**options)
+            wait = self.thread_condition.wait
+            self.thread_condition.wait = lambda _: wait(0.01) or True
+
+        def __next__(self):
+            assert self.has_ready(), 'this wait does not look at workers and scheduler'
+            return super().__next__()
+
+    monkeypatch.setattr(distributed, 'as_completed', NotifiedLate)
+    calls = [partial(time.sleep, 0.2), partial(time.sleep, 0.0)]
+    done = dict(completed_on(Cluster(cluster.address), calls, stop_at_error=False))
+    assert done == {number: Outcome(None, '') for number in range(2)}
 
 
 # -- what ends amid work ----------------------------------------------------------------------------------------------

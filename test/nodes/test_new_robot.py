@@ -12,6 +12,7 @@ from harness.spin_nodes import SpunNodes, ros_context
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import FluidPressure, JointState
+from std_msgs.msg import String
 
 from seal_friction_ros.files import read_machine
 
@@ -75,18 +76,27 @@ def test_the_mapping_file_of_a_running_machine_loads_and_names_gauge_pressures(t
     assert 'bore' in said
 
 
-def test_a_graph_without_a_machine_is_one_line_with_the_nodes_that_are_silent(tmp_path):
-    with ros_context(domain := free_domain()) as context:
-        compiling = Node('compiling', context=context)
+def test_a_graph_without_a_machine_is_one_line_with_all_types_and_the_nodes_that_are_silent(tmp_path):
+    types = '/ram/p_a (sensor_msgs/msg/FluidPressure, std_msgs/msg/String)'
+    with ros_context(domain := free_domain()) as context, ros_context(domain) as other:
+        compiling, idle, foreign = (
+            Node('compiling', context=context),
+            Node('idle', context=context),
+            Node('foreign', context=other),
+        )
         compiling.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        for wait in ('0.5', '4', '30'):  # a busy machine takes longer to find the node
+        idle.create_publisher(FluidPressure, '/ram/p_a', 10)
+        foreign.create_publisher(String, '/ram/p_a', 10)
+        for wait in ('0.5', '4', '30'):  # a busy machine takes longer to find the nodes
             process = new_robot(tmp_path / 'robot.yaml', domain, '--wait', wait)
             _, said = process.communicate(timeout=120)
             assert process.returncode == 2
             assert f'no message of a type that can be an input within {wait} s' in said
             assert len(said.strip().splitlines()) == 1
-            if 'silent: node /compiling' in said:
+            if types in said and 'node /compiling' in said:
                 break
-        compiling.destroy_node()
-    assert 'silent: node /compiling' in said
+        for made in (compiling, idle, foreign):
+            made.destroy_node()
+    assert types in said
+    assert 'silent: /ram/p_a of /foreign, /idle; node /compiling' in said
     assert not (tmp_path / 'robot.yaml').exists()

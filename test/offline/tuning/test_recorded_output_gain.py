@@ -20,6 +20,7 @@ from seal_friction_ros.core.messages.layouts import (
     POSITION_TYPE,
     PRESSURE_TYPE,
     REFERENCE_TYPE,
+    TEMPERATURE_TYPE,
     VELOCITY_TYPE,
 )
 from seal_friction_ros.core.messages.records import Force, Position, Pressure, ServoReference, Velocity
@@ -36,7 +37,7 @@ ENCODERS = {
 }
 
 
-def write_axis(path: Path, type_name: str, moves: bool = True, last: bytes = b'') -> Path:
+def write_axis(path: Path, type_name: str, moves: bool = True, last: tuple[str, str, bytes] | None = None) -> Path:
     """Bag of a servo that takes positions only, on /command, and has no other reference in its loop."""
     wave = Sine(0.002, 0.5)
     state = servo.init(PLANT)
@@ -58,7 +59,8 @@ def write_axis(path: Path, type_name: str, moves: bool = True, last: bytes = b''
                 writer.write(topic, kind, stamp, data)
             state, out = servo.step(PLANT, state, Setpoint(reference.position, 0.0, 0.0))
         if last:
-            writer.write('/command', type_name, 6000_000_000, last)
+            topic, kind, data = last
+            writer.write(topic, kind, 6000_000_000, data)
     return path
 
 
@@ -105,7 +107,28 @@ def test_bag_that_cannot_tell_the_gain_is_rejected_and_nothing_is_written(option
     'data', [b'\0', b'\0\1\0\0', b'\0\0\0\0' + bytes(8), b'\0\1\0\0' + struct.pack('<III', 0, 0, 0)]
 )
 def test_malformed_command_is_an_error(data, tmp_path, capsys):
-    bag = write_axis(tmp_path / 'bag', NUMBERS_TYPE, last=data)
+    bag = write_axis(tmp_path / 'bag', NUMBERS_TYPE, last=('/command', NUMBERS_TYPE, data))
     options = ['--command-topic', '/command', *AREAS]
     assert main(['tune', '--bag', str(bag), '--out', str(tmp_path / 'f.yaml'), *options]) == 2
     assert 'message on /command at 6000000000 ns: ' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('topic', 'type_name'),
+    [
+        (b.FORCE_TOPIC, FORCE_TYPE),
+        (b.TEMPERATURE_TOPIC, TEMPERATURE_TYPE),
+        (b.CONFIGURATION_TOPIC, CONFIGURATION_TYPE),
+    ],
+)
+def test_a_malformed_input_that_the_gain_does_not_need_is_the_same_error_without_a_command(
+    topic, type_name, tmp_path, capsys
+):
+    """The estimates of the tuning are made of this input: no bag gives its gain and no feed-forward."""
+    bag = write_axis(tmp_path / 'bag', NUMBER_TYPE, last=(topic, type_name, b'\0'))
+    said = []
+    for options in ([], ['--command-topic', '/command', *AREAS]):
+        assert main(['tune', '--bag', str(bag), '--out', str(tmp_path / 'f.yaml'), *options]) == 2
+        said.append(capsys.readouterr().err)
+    assert said[0] == said[1]
+    assert f'message on {topic} at 6000000000 ns: ' in said[0]
