@@ -228,8 +228,10 @@ def sliding_friction(
     """
     if seal.law_depends_on_speed:
         return evaluate(seal.law, pressure, speed)
-    viscous, stribeck, stribeck_velocity, asymmetry = seal.velocity_terms
-    return with_velocity_terms(coulomb_friction, speed, direction, viscous, stribeck, stribeck_velocity, asymmetry)
+    viscous, stribeck, stribeck_velocity, asymmetry, ratio, uneven = seal.velocity_terms
+    return with_velocity_terms(
+        coulomb_friction, speed, direction, viscous, stribeck, stribeck_velocity, asymmetry, ratio, uneven
+    )
 
 
 @compilable

@@ -17,11 +17,16 @@ def with_velocity_terms(
     stribeck_friction: float,
     stribeck_velocity: float,
     asymmetry: float,
+    stribeck_ratio: float,
+    viscous_asymmetry: float,
 ) -> float:
     """Sliding friction [N]: the equation of `VelocityTerms`."""
-    sliding = coulomb_friction + viscous_friction * speed
-    if stribeck_friction > 0.0:
-        sliding += stribeck_friction * math.exp(-speed / stribeck_velocity)
+    viscous = viscous_friction * speed
+    if viscous_asymmetry != 0.0:
+        viscous *= 1.0 + viscous_asymmetry if direction > 0 else 1.0 - viscous_asymmetry
+    sliding = coulomb_friction + viscous
+    if stribeck_friction > 0.0 or stribeck_ratio > 0.0:
+        sliding += (stribeck_friction + stribeck_ratio * coulomb_friction) * math.exp(-speed / stribeck_velocity)
     return sliding * (1.0 + asymmetry if direction > 0 else 1.0 - asymmetry)
 
 
@@ -32,18 +37,22 @@ class VelocityTermNumbers(NamedTuple):
     stribeck_friction: float
     stribeck_velocity: float
     asymmetry: float
+    stribeck_ratio: float
+    viscous_asymmetry: float
 
 
-NO_VELOCITY_TERMS = VelocityTermNumbers(0.0, 0.0, 1.0, 0.0)
+NO_VELOCITY_TERMS = VelocityTermNumbers(0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class VelocityTerms(CheckedParameters):
     r"""Sliding friction of a seal beyond its Coulomb friction.
 
-    .. math:: F = [f_c + \sigma |v| + f_S\,e^{-|v|/v_S}]\,(1 + a\,\mathrm{sgn}(v))
+    .. math:: F = [f_c + \sigma |v|\,(1 + q\,\mathrm{sgn}(v)) + (f_S + r f_c)\,e^{-|v|/v_S}]\,(1 + a\,\mathrm{sgn}(v))
 
-    Source: [Armstrong1994]_ eq. (5) with an exponent of 1, which is our choice, as is one asymmetry for all terms.
+    Mixed friction is a share r of the Coulomb friction, so that it rises with the pressure, too; that of a film is not.
+
+    Source: [Armstrong1994]_ eq. (5) with an exponent of 1, which is our choice, as are both asymmetries.
     """
 
     viscous_friction: float = parameter(
@@ -81,6 +90,24 @@ class VelocityTerms(CheckedParameters):
         upper=0.9,
         description='a, share by which friction is larger on extension and smaller on retraction.',
         symbol='a',
+        start=lambda _: 0.0,
+    )
+    stribeck_ratio: float = parameter(
+        0.0,
+        unit='1',
+        lower=0.0,
+        upper=10.0,
+        description='r, likewise, as a share of f_c.',
+        symbol='r',
+        start=lambda _: 0.1,
+    )
+    viscous_asymmetry: float = parameter(
+        0.0,
+        unit='1',
+        lower=-0.9,
+        upper=0.9,
+        description='q, that of viscous friction alone.',
+        symbol='q',
         start=lambda _: 0.0,
     )
 
