@@ -2,7 +2,7 @@
 
 ``python test/system/blind_logs.py FOLDER`` with the shared data in FOLDER. Least squares fits five terms to the same
 samples, [sign v, v, sign v P, v P, 1] with the mean pressure P at the seals. An offset of each other log is free. Seals
-of the Delft rig: each pressure by the others, and two runs of one ring.
+of the Delft rig: each pressure by the others (an outlier is none), and two runs of one ring.
 """
 
 import sys
@@ -81,11 +81,12 @@ def predicted(name: str, first: Sequence[Path], others: Sequence[Path], rig: str
 def left_out(ring: str, bars: Sequence[int], folder: Path, delft: Path) -> dict:
     """Row of the table: each pressure of a ring by the law fitted to the others."""
     run = Run(folder, *(str(delft / f'{ring}_{bar}bar.csv') for bar in bars), '--rig', 'delft')
-    f = {name: np.array(run.figures[name]) for name in ('measured_N', 'left_out_N', 'left_out_nested_N', 'std_N')}
+    names, used = ('measured_N', 'left_out_N', 'left_out_nested_N', 'std_N'), ~np.array(run.figures['is_outlier'])
+    f = {name: np.array(run.figures[name])[used] for name in names}
     off = np.abs(f['left_out_N'] - f['measured_N'])
     return {
         'log': f'{ring}, a pressure left out',
-        'law': run.figures['law'],
+        'law': run.figures['law'] + ', without an outlier' * (not used.all()),
         'worst [%]': 100.0 * float(np.max(off / f['measured_N'])),
         'chosen anew [%]': 100.0 * float(np.nanmax(np.abs(f['left_out_nested_N'] / f['measured_N'] - 1.0))),
         'in band [%]': 100.0 * float(np.mean(off <= BAND_95 * f['std_N'])),

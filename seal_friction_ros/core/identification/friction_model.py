@@ -382,7 +382,7 @@ def _prior(problem: Problem, terms: _Terms) -> FloatArray:
 
     def fixed(value: float) -> tuple[float, float, float, float]:
         """Prior of a parameter that stays where it is."""
-        return value, FIXED, value - 10.0 * FIXED, value + 10.0 * FIXED
+        return value, FIXED, value, value
 
     optional = (VISCOUS_PRIOR, STRIBECK_PRIOR, STRIBECK_PRIOR)
     rows = [FRICTION_PRIOR] * (1 + len(problem.columns))
@@ -558,7 +558,7 @@ def fit_model(readings: FrictionReadings, columns: Sequence[Columns], told: Told
     not ``told`` are 0. With ``is_open``, viscous friction and free exponents stay, since other readings may tell them.
     Models are compared by the scatter about that of all terms.
     """
-    problem, kinds = _problem(readings, columns, told), len(columns)
+    problem, kinds = _problem(readings.as_means, columns, told), len(columns)
     speed = (told.viscous, told.stribeck, told.stribeck)
     everything = _Terms(speed, (told.asymmetry, False), told.drift, told.areas, (None,) * kinds)
     start, scatter = _start(problem), _Scatter(CLUSTER_PRIOR, CLUSTER_PRIOR)

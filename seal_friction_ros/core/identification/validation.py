@@ -216,6 +216,7 @@ def model_uncertainty(model: ModelFit, readings: FrictionReadings, in_addition: 
     the friction; N readings, k terms fitted. ``in_addition``, as of `prediction_uncertainty`,
     is added in square. Our choice.
     """
+    readings = readings.as_means
     friction = model.friction(readings.at)
     rest = readings.magnitudes(model.offsets) - friction
     fitted = 0 if readings.are_samples else int(model.told.sum())
