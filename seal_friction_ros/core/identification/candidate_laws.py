@@ -261,7 +261,9 @@ def law_of_all_terms(variation: Variation, kinds: tuple[SealKind, ...] = ()) -> 
     """
     law_type = PressurePowerLaw if variation.pressures else ConstantCoulomb
     told = {'asymmetry'} if variation.asymmetry else set()
-    told |= {'viscous_friction', 'stribeck_friction', 'stribeck_velocity'} if variation.speeds else set()
+    if variation.speeds:
+        told |= {'viscous_friction', 'stribeck_friction', 'stribeck_velocity', 'stribeck_ratio'}
+        told |= {'viscous_asymmetry'} if variation.asymmetry else set()
     terms = tuple(p for p in fitted_parameters(VelocityTerms) if p.name in told)
     parts = {'viscous_friction': 'viscous', 'stribeck_friction': 'Stribeck', 'asymmetry': 'asymmetry'}
     formula = ' + '.join([law_type.FORMULA, *(parts[p.name] for p in terms if p.name in parts)])

@@ -124,8 +124,7 @@ def design_experiment(
     speeds = _grid_speeds(used_speeds)
     design = _Design(_model(readings, is_varied=is_varied), _range_points(pressures, speeds))
     model = design.model
-    at = design.conditions(_range_points((low, high), used_speeds))
-    law_error = float(np.sqrt(np.mean((model.std(at) / design.friction(at)) ** 2)))
+    law_error = _Design(model, _range_points((low, high), used_speeds)).error(design.information)
     parts = {RUN_TO_RUN: of_band, LAW: law_error, SCATTER: model.scatter}
     is_limited_by_runs = of_band >= max(parts.values())
 
@@ -154,10 +153,10 @@ def design_experiment(
 
 
 def _model(readings: FrictionReadings, *, is_varied: bool) -> ModelFit:
-    """The model of one kind of seals, with viscous friction even if the speed was not varied."""
+    """The model of one kind of seals, of any exponent, with viscous friction even if the speed was not varied."""
     variation = variation_of(readings)
     told = Told(viscous=True, stribeck=is_varied, asymmetry=variation.asymmetry, areas=False)
-    return fit_model(readings, [slice(None)] * (variation.pressures > 0), told)
+    return fit_model(readings, [slice(None)] * (variation.pressures > 0), told, is_open=True)
 
 
 def repeated_run(between: BetweenRuns, freedom: int) -> RepeatedRun:
@@ -181,7 +180,9 @@ class _Design:
         at = self.conditions(points)
         self._told = np.flatnonzero(model.told)
         self._range = self._slopes(at) / self.friction(at)[:, np.newaxis]
-        self.information = np.asarray(np.linalg.inv(model.covariance[np.ix_(self._told, self._told)]), np.float64)
+        self.information = np.asarray(
+            np.linalg.inv(model.chosen.covariance[np.ix_(self._told, self._told)]), np.float64
+        )
 
     def friction(self, at: OperatingConditions) -> FloatArray:
         """Friction [N], not below 5 % of its mean, so that a relative error is finite."""

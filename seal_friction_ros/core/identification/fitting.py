@@ -1,7 +1,9 @@
 """Fit of a candidate law to friction readings, together with one offset of the force sum for each source."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import least_squares, nnls
@@ -17,12 +19,14 @@ from seal_friction_ros.core.identification.friction_model import (
     ASYMMETRY_PRIOR,
     STRIBECK_PRIOR,
     STRIBECK_SPEED_PRIOR,
+    VISCOUS_ASYMMETRY_PRIOR,
     ModelFit,
     Told,
     fit_model,
 )
 from seal_friction_ros.core.identification.readings import FrictionReadings
 
+DIFFERENCE = 1e-6  # of a parameter of the model, for a derivative
 ILL_CONDITIONED = 30.0  # condition number of the scaled Jacobian; after [Belsley1980]_
 LINEAR = {'coulomb_friction_at_any_pressure', 'friction_at_no_pressure', 'friction_at_one_bar', 'viscous_friction'}
 """Parameters in which a law is linear, where all its parameters are of them."""
@@ -120,15 +124,20 @@ def fit(law: CandidateLaw, readings: FrictionReadings, start_values: ParameterVa
     return LawFit(law, values, offsets_of(readings, law.friction(readings.at, values)), np.asarray(best.jac))
 
 
+@lru_cache(maxsize=2)
 def _fit_with_prior(law: CandidateLaw, readings: FrictionReadings) -> LawFit:
-    """As `fit`, for a law of all terms: the most probable one."""
-    terms, seals = law.velocity_terms, readings.at.pressure.shape[1]
-    told = Told('viscous_friction' in terms, 'stribeck_friction' in terms, 'asymmetry' in terms, areas=False)
-    columns = [columns_of(law.kinds, number) for number in range(len(law.kinds))]
-    columns = columns or [slice(None)] * law.depends_on_pressure
-    model = fit_model(readings, columns, told)
-    values = values_of_model(law, model, seals)
+    """As `fit`, for a law of all terms: the most probable one, kept for who leaves groups out next."""
+    model = model_of(law, readings)
+    values = values_of_model(law, model, readings.at.pressure.shape[1])
     return LawFit(law, values, model.offsets, slopes(law, values, readings.at) / readings.scale[:, np.newaxis], model)
+
+
+def model_of(law: CandidateLaw, readings: FrictionReadings, *, drift: bool = False) -> ModelFit:
+    """The model of a law of all terms, with a ``drift`` over the way of each source if it is asked for."""
+    terms = law.velocity_terms
+    told = Told('viscous_friction' in terms, 'stribeck_friction' in terms, 'asymmetry' in terms, False, drift)
+    columns = [columns_of(law.kinds, number) for number in range(len(law.kinds))]
+    return fit_model(readings, columns or [slice(None)] * law.depends_on_pressure, told)
 
 
 def values_of_model(law: CandidateLaw, model: ModelFit, seals: int) -> dict[str, float]:
@@ -142,6 +151,8 @@ def values_of_model(law: CandidateLaw, model: ModelFit, seals: int) -> dict[str,
         'stribeck_friction': falling / of,
         'stribeck_velocity': speed,
         'asymmetry': model.asymmetry,
+        'stribeck_ratio': model.stribeck_ratio,
+        'viscous_asymmetry': model.viscous_asymmetry,
     }
     names = [f'{kind.name}.' for kind in law.kinds] or ['']
     for name, rise, exponent in zip(names, model.rises.tolist(), model.exponents, strict=False):
@@ -150,15 +161,39 @@ def values_of_model(law: CandidateLaw, model: ModelFit, seals: int) -> dict[str,
     return {p.name: values[p.name] for p in law.parameters} | {f'{name}share': share for name, share in shares}
 
 
+def covariance_of_terms(
+    found: LawFit, seals: int, terms: Callable[[ParameterValues], Sequence[float]]
+) -> FloatArray | None:
+    """Covariance of numbers that follow from the parameters, by the posterior of a law with priors; None for others.
+
+    ``terms`` gives the numbers; by their differences, to first order.
+    """
+    model = found.model
+    if model is None:
+        return None
+    base, columns = np.array(terms(values_of_model(found.law, model, seals))), []
+    for index in range(len(model.vector)):
+        vector = model.vector.copy()
+        vector[index] += DIFFERENCE
+        moved = values_of_model(found.law, replace(model, vector=vector), seals)
+        columns.append((np.array(terms(moved)) - base) / DIFFERENCE)
+    slopes = np.column_stack(columns)
+    return np.asarray(slopes @ model.covariance @ slopes.T)
+
+
 def std_of_none(law: CandidateLaw, model: ModelFit, seals: int) -> dict[str, float]:
     """Prior standard deviation of each velocity term that is less probable than none, as of `values_of_model`."""
-    found: dict[str, float] = {}
-    if not model.told[model.layout.linear.stop - 1]:
-        found['stribeck_friction'] = STRIBECK_PRIOR[1] * model.size / (1 if law.kinds else seals)
+    layout, of = model.layout, 1 if law.kinds else seals
+    priors = {
+        'stribeck_ratio': (layout.viscous + 1, STRIBECK_PRIOR[1]),
+        'stribeck_friction': (layout.viscous + 2, STRIBECK_PRIOR[1] * model.size / of),
+        'asymmetry': (layout.asymmetry, ASYMMETRY_PRIOR[1]),
+        'viscous_asymmetry': (layout.asymmetry + 1, VISCOUS_ASYMMETRY_PRIOR[1]),
+    }
+    found = {name: std for name, (index, std) in priors.items() if name in law.velocity_terms and not model.told[index]}
+    if {'stribeck_ratio', 'stribeck_friction'} <= set(found):
         found['stribeck_velocity'] = STRIBECK_SPEED_PRIOR[1] * model.stribeck[1]
-    if not model.told[model.layout.asymmetry]:
-        found['asymmetry'] = ASYMMETRY_PRIOR[1]
-    return {name: std for name, std in found.items() if name in law.velocity_terms}
+    return found
 
 
 def slopes(law: CandidateLaw, values: ParameterValues, at: OperatingConditions) -> FloatArray:

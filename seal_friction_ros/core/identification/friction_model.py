@@ -1,47 +1,57 @@
 r"""One model of the friction for one kind of seals or several: the batch solution of the filter of the estimate.
 
-.. math:: y = d\,(1 + a\,d)\,\Big[f_0 + \sum_k K_k \sum_j (P_{kj}/1\,\mathrm{bar})^{m_k} + \sigma\,|v|
-          + f_S\,e^{-|v|/v_S}\Big] + b_s + \Delta A_a\,p_a + \Delta A_b\,p_b + e
+.. math:: y = d\,(1 + a\,d)\,(1 + w\,\tau)\,\Big[f_c\,(1 + r\,e^{-|v|/v_S}) + \sigma\,|v|\,(1 + q\,d)
+          + f_S\,e^{-|v|/v_S}\Big] + b_s + \Delta A_a\,p_a + \Delta A_b\,p_b + e, \qquad
+          f_c = f_0 + \sum_k K_k \sum_j (P_{kj}/1\,\mathrm{bar})^{m_k}
 
-with the pressure :math:`P_{kj}` that seal j of kind k sees, an offset of each source and errors of the areas in the
-force sum. Every term has a prior, so a term that the data do not excite stays where its prior has it, and what cannot
-be told apart stays in the covariance of the posterior: laws are averaged, none is chosen. The error e has a part that
-all readings of a cluster share (a stroke of a swept log, a held pressure), so that many samples of few strokes do not
-count as many readings.
+with the pressure :math:`P_{kj}` that seal j of kind k sees, the share :math:`\tau` of the way of a source that is still
+to come, an offset of each source and errors of the areas in the force sum. Every term has a prior. Models with and
+without each term, and with exponents that contacts have or free ones, are weighted by their evidence: parameters are
+those of the most probable one, and what the others say is in the standard deviation. A term that the data cannot tell
+from an offset is left out. The error e has the noise of the sensors, a part of each reading and one that all readings
+of a cluster share (a stroke of a swept log, a held pressure), so that many samples of few strokes do not count as many
+readings.
 
 Source: maximum a posteriori with the covariance of Laplace, [Gelman2013]_ chapter 4. Model and priors are our choice.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.foundation.units import BAR
-from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
+from seal_friction_ros.core.identification.candidate_laws import EXPONENTS, OperatingConditions
 from seal_friction_ros.core.identification.readings import FrictionReadings, numbered
 
 # Priors: mean, standard deviation, lower and upper bound. A share is one of the mean friction.
 FRICTION_PRIOR = (0.0, 10.0, 0.0, 100.0)  # [-] share: f_0, and the rise of each kind at its mean pressure
-EXPONENT_PRIOR = (1.0, 0.3, 0.3, 2.5)  # [-] m: an elastic contact has 2/3, lip seals up to 3/2
+EXPONENT_PRIOR = (1.0, 0.3, 0.3, 2.0)  # [-] m where it is free
 VISCOUS_PRIOR = (0.0, 1.0, 0.0, 100.0)  # [-] share at the mean speed
-STRIBECK_PRIOR = (0.0, 0.3, 0.0, 10.0)  # [-] share
+STRIBECK_PRIOR = (0.0, 0.3, 0.0, 10.0)  # [-] r, and f_S as a share
 STRIBECK_SPEED_PRIOR = (math.log(0.3), 1.0, math.log(0.01), math.log(3.0))  # ln of v_S over the mean speed
-ASYMMETRY_PRIOR = (0.0, 0.08, -0.9, 0.9)  # [-]
+ASYMMETRY_PRIOR = (0.0, 0.08, -0.9, 0.9)  # [-] a
+VISCOUS_ASYMMETRY_PRIOR = (0.0, 0.15, -0.9, 0.9)  # [-] q
+DRIFT_PRIOR = (0.0, 0.15, -0.9, 3.0)  # [-] w
 AREA_PRIOR = (0.0, 5.0, -100.0, 100.0)  # [-] share at the highest pressure of the chamber
 OFFSET_PRIOR = (0.0, 1e3, -1e9, 1e9)  # [-] share
-NOT_TOLD = (0.0, 1e-6, -1e-5, 1e-5)  # of a term that readings do not tell: it stays 0
-OPTIONAL = ('stribeck', 'asymmetry', 'areas')  # terms of `Told` that stay out unless they are more probable
+FIXED = 1e-6  # standard deviation of a parameter that is not fitted
+BEND = 0.5  # [-] standard deviation of the exponent of viscous friction over the speed, which the law has as 1
 LOG_ODDS = math.log(2.0)  # [-] of an optional term to be absent, before the readings are seen (our choice)
+COLLINEAR = 0.5  # [-] of its prior: standard deviation of a term from which it is not told from an offset (our choice)
 CLUSTER_PRIOR = 0.03  # [-] standard deviation of the friction between clusters, expected
 CLUSTER_FREEDOM = 1.0  # with this weight
+WITHIN_FREEDOM = 5.0  # degrees of freedom by which readings of one cluster are expected to differ by noise alone
+SMALLEST_SCATTER = 1e-4  # [-] of the friction
+SMALLEST_WEIGHT = 1e-4  # [-] of a model that is averaged
 NOTHING = 1e-6  # [-] share that counts as 0
 MOST_STEPS = 100  # of a fit
-CONVERGED = 1e-9  # [-] change of the cost that ends it
+CONVERGED = 1e-6  # [-] change of the cost that ends it
 
 
 class Told(NamedTuple):
@@ -51,23 +61,49 @@ class Told(NamedTuple):
     stribeck: bool
     asymmetry: bool
     areas: bool
+    drift: bool = False
+
+
+class _Terms(NamedTuple):
+    """Terms of one model; those that are absent are 0."""
+
+    speed: tuple[bool, bool, bool]  # viscous friction, Stribeck friction by r and by f_S
+    asymmetry: tuple[bool, bool]  # a, q
+    drift: bool
+    areas: bool
+    exponents: tuple[float | None, ...]  # of each kind; None: free
+
+    @property
+    def optional(self) -> int:
+        """Number of the terms that are less probable than none before the readings are seen."""
+        return sum((*self.speed[1:], *self.asymmetry, self.drift, self.areas))
 
 
 class _Layout(NamedTuple):
-    """Where the parameters stand in a vector: first what friction is linear in, f_0, rises, viscous, Stribeck."""
+    """Where the parameters stand in a vector: first what friction is linear in: f_0, rises, viscous, r, f_S."""
 
     linear: slice
+    viscous: int
     exponents: slice
     speed: int  # ln v_S
-    asymmetry: int
+    asymmetry: int  # a, then q
+    drift: int
     areas: slice
     offsets: slice
 
 
 def _layout(kinds: int) -> _Layout:
-    first = kinds + 3
-    exponents, speed = slice(first, first + kinds), first + kinds
-    return _Layout(slice(first), exponents, speed, speed + 1, slice(speed + 2, speed + 4), slice(speed + 4, None))
+    viscous, speed = kinds + 1, 2 * kinds + 4
+    return _Layout(
+        linear=slice(kinds + 4),
+        viscous=viscous,
+        exponents=slice(viscous + 3, speed),
+        speed=speed,
+        asymmetry=speed + 1,
+        drift=speed + 3,
+        areas=slice(speed + 4, speed + 6),
+        offsets=slice(speed + 6, None),
+    )
 
 
 Columns = tuple[int, ...] | slice
@@ -82,8 +118,31 @@ class Problem(NamedTuple):
     speed: float  # [m/s] mean
     highest: FloatArray  # [Pa] pressure of chambers a and b, shape (2,)
     free: FloatArray  # columns of areas and offsets [N], shape (n, 2 + sources)
-    prior: FloatArray  # mean, standard deviation, lower and upper bound of each parameter, shape (count, 4)
+    to_come: FloatArray  # [-] share of the way of its source after each reading, shape (n,); 0 where it is not known
+    scale: FloatArray  # [N] friction about each reading, shape (n,)
+    noise: FloatArray  # [-] of the sensors, of that friction, shape (n,)
+    cluster: IntArray  # number of the cluster of each reading, shape (n,)
     sources: IntArray  # that have an offset
+
+
+class _Scatter(NamedTuple):
+    """Relative standard deviation of the friction from the model."""
+
+    within: float  # [-] of a reading within its cluster, beyond the noise of the sensors
+    between: float  # [-] of a cluster
+
+
+class _Fit(NamedTuple):
+    """One model fitted to the readings."""
+
+    terms: _Terms
+    prior: FloatArray  # mean, standard deviation, lower and upper bound of each parameter, shape (count, 4)
+    vector: FloatArray
+    information: FloatArray  # on the vector, by readings and prior, shape (parameters, parameters)
+    covariance: FloatArray  # its inverse
+    rows: FloatArray  # weighted derivatives of what is left of each reading, shape (n, parameters)
+    left: FloatArray  # weighted rest of each reading, shape (n,)
+    log_evidence: float  # of the readings by the method of Laplace, but for a constant, and of the terms
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,16 +150,24 @@ class ModelFit:
     """The model fitted to readings."""
 
     problem: Problem
-    vector: FloatArray  # f_0, rises, viscous, Stribeck [share]; m, ln v_S, a; areas, offsets [share]
-    covariance: FloatArray  # of the vector
-    rows: FloatArray  # weighted derivatives of what is left of each reading, shape (n, parameters)
-    left: FloatArray  # weighted rest of each reading, shape (n,)
+    chosen: _Fit
+    vector: FloatArray  # f_0, rises, viscous, r, f_S [share]; m, ln v_S, a, q, w; areas, offsets [share]
     scatter: float  # [-] standard deviation of one more reading, or one more stroke of a swept log, from the model
+    averaged: tuple[tuple[float, _Fit, '_Bend'], ...]  # weight of each probable model
 
     @property
     def told(self) -> BoolArray:
-        """Which parameters of the friction readings tell, shape (parameters,); the others are 0."""
-        return np.asarray(self.problem.prior[: self.layout.asymmetry + 1, 1] > NOT_TOLD[1])
+        """Which parameters of the friction readings tell, shape (parameters,); the others are fixed."""
+        return np.asarray(self.chosen.prior[: self.layout.drift + 1, 1] > FIXED)
+
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """Covariance of the vector, by the posterior of all probable models, shape (parameters, parameters)."""
+        off = [fit.vector - self.chosen.vector for _, fit, _ in self.averaged]
+        each = [
+            weight * (fit.covariance + np.outer(d, d)) for (weight, fit, _), d in zip(self.averaged, off, strict=True)
+        ]
+        return np.asarray(np.sum(each, axis=0))
 
     @property
     def columns(self) -> tuple[Columns, ...]:
@@ -165,13 +232,18 @@ class ModelFit:
     @property
     def viscous(self) -> float:
         """Viscous friction of all seals [N s/m]."""
-        return float(self.vector[len(self.columns) + 1]) * self.size / self.problem.speed
+        return float(self.vector[self.layout.viscous]) * self.size / self.problem.speed
 
     @property
     def stribeck(self) -> tuple[float, float]:
-        """Stribeck friction of all seals [N] and its speed [m/s]."""
+        """Stribeck friction of all seals that does not follow the pressure [N], and its speed [m/s]."""
         speed = self.problem.speed * math.exp(self.vector[self.layout.speed])
-        return float(self.vector[len(self.columns) + 2]) * self.size, speed
+        return float(self.vector[self.layout.viscous + 2]) * self.size, speed
+
+    @property
+    def stribeck_ratio(self) -> float:
+        """Stribeck friction as a share r of the Coulomb friction [-]."""
+        return float(self.vector[self.layout.viscous + 1])
 
     @property
     def asymmetry(self) -> float:
@@ -179,12 +251,23 @@ class ModelFit:
         return float(self.vector[self.layout.asymmetry])
 
     @property
+    def viscous_asymmetry(self) -> float:
+        """Share q by which viscous friction is larger on extension, beside a."""
+        return float(self.vector[self.layout.asymmetry + 1])
+
+    @property
+    def drift(self) -> tuple[float, float]:
+        """Share w by which friction was larger at the start of a source than at its end, and its standard error."""
+        index = self.layout.drift
+        return float(self.vector[index]), math.sqrt(float(self.covariance[index, index]))
+
+    @property
     def errors(self) -> FloatArray:
         """Standard error of `parts` [N], shape (kinds,)."""
         return np.asarray(np.sqrt(np.diag(self.covariance)[1 : 1 + len(self.columns)]) * self.size)
 
     def friction(self, at: OperatingConditions) -> FloatArray:
-        """Magnitude of the friction of all seals [N], shape (n,)."""
+        """Magnitude of the friction of all seals [N] at the end of the way, shape (n,)."""
         return _magnitude(self.problem, self.vector, at)[0]
 
     def slopes(self, at: OperatingConditions) -> FloatArray:
@@ -192,10 +275,18 @@ class ModelFit:
         return _magnitude(self.problem, self.vector, at)[1]
 
     def std(self, at: OperatingConditions) -> FloatArray:
-        """Standard deviation of the friction [N], shape (n,), by the covariance of the posterior."""
-        slopes = self.slopes(at)
-        known = slopes.shape[1]
-        return np.asarray(np.sqrt(np.einsum('ni,ij,nj->n', slopes, self.covariance[:known, :known], slopes)))
+        """Standard deviation of the friction [N], shape (n,), by the posterior of all probable models.
+
+        It has what they differ by, and how far viscous friction may be from a line over the speed (`BEND`).
+        """
+        chosen, known = self.friction(at), len(self.told)
+        variance = np.zeros(len(chosen))
+        for weight, fit, bend in self.averaged:
+            friction, slopes = _magnitude(self.problem, fit.vector, at)
+            own = np.einsum('ni,ij,nj->n', slopes, fit.covariance[:known, :known], slopes)
+            bent = _bending(self.problem, fit.vector, at) - slopes @ bend.compensated[:known]
+            variance += weight * (own + bend.variance * bent**2 + (friction - chosen) ** 2)
+        return np.asarray(np.sqrt(variance))
 
 
 def _power_sum(at: OperatingConditions, columns: Columns, m: float) -> tuple[FloatArray, FloatArray]:
@@ -211,23 +302,44 @@ def _means(problem: Problem, exponents: Sequence[float] | FloatArray) -> list[tu
     return [(float(total.mean()), float(slope.mean())) for total, slope in each]
 
 
-def _magnitude(problem: Problem, vector: FloatArray, at: OperatingConditions) -> tuple[FloatArray, FloatArray]:
+def _magnitude(
+    problem: Problem, vector: FloatArray, at: OperatingConditions, to_come: FloatArray | float = 0.0
+) -> tuple[FloatArray, FloatArray]:
     """Friction [N], shape (n,), and its derivatives by the parameters of the friction, shape (n, parameters)."""
     layout, size, columns = _layout(len(problem.columns)), problem.size, problem.columns
-    means, typical = _means(problem, vector[layout.exponents]), problem.speed
-    speed, direction = np.nan_to_num(np.abs(at.velocity)) / typical, at.direction
+    means = _means(problem, vector[layout.exponents])
+    viscous, ratio, force = vector[layout.viscous : layout.viscous + 3]
+    even, uneven, drift = vector[layout.asymmetry : layout.drift + 1]
+    speed, direction = np.nan_to_num(np.abs(at.velocity)) / problem.speed, at.direction
     falling = math.exp(-vector[layout.speed]) * speed
+    mixed = np.exp(-falling)
     rising, bending = [], []
     for kind, (chosen, (mean, slope)) in enumerate(zip(columns, means, strict=True)):
         powers, slopes = _power_sum(at, chosen, float(vector[layout.exponents][kind]))
         rising.append(powers / max(mean, 1e-300))
         bending.append(vector[1 + kind] * (slopes - rising[-1] * slope) / max(mean, 1e-300))
-    linear = np.column_stack((np.ones(len(speed)), *rising, speed, np.exp(-falling)))
-    symmetric = linear @ vector[layout.linear]
-    by_speed = vector[len(columns) + 2] * np.exp(-falling) * falling
-    side = (1.0 + vector[layout.asymmetry] * direction)[:, np.newaxis]
-    slopes = np.column_stack((side * np.column_stack((linear, *bending, by_speed)), direction * symmetric))
-    return size * side[:, 0] * symmetric, size * slopes
+    pressed = np.column_stack((np.ones(len(speed)), *rising))
+    coulomb, share = pressed @ vector[: len(columns) + 1], (1.0 + ratio * mixed)[:, np.newaxis]
+    film, side, later = viscous * speed, 1.0 + even * direction, 1.0 + drift * to_come
+    symmetric = coulomb * share[:, 0] + film * (1.0 + uneven * direction) + force * mixed
+    by_speed = (coulomb * ratio + force) * mixed * falling
+    inner = (share * pressed, speed * (1.0 + uneven * direction), coulomb * mixed, mixed,
+             *(share[:, 0] * each for each in bending), by_speed)  # fmt: skip
+    slopes = np.column_stack(
+        (
+            (side * later)[:, np.newaxis] * np.column_stack(inner),
+            direction * later * symmetric,
+            side * later * film * direction,
+            side * symmetric * to_come,
+        )
+    )
+    return size * side * later * symmetric, size * slopes
+
+
+def _bending(problem: Problem, vector: FloatArray, at: OperatingConditions) -> FloatArray:
+    """Derivative of the friction [N] by the exponent of its viscous part over the speed, at 1, shape (n,)."""
+    speed = np.maximum(np.nan_to_num(np.abs(at.velocity)) / problem.speed, 1e-9)
+    return np.asarray(problem.size * vector[_layout(len(problem.columns)).viscous] * speed * np.log(speed))
 
 
 def _problem(readings: FrictionReadings, columns: Sequence[Columns], told: Told) -> Problem:
@@ -239,28 +351,87 @@ def _problem(readings: FrictionReadings, columns: Sequence[Columns], told: Told)
         highest = np.maximum(np.abs(readings.chamber_pressures).max(axis=0), 1.0)
         both = readings.chamber_pressures / highest
     free = size * np.column_stack((both, readings.source[:, np.newaxis] == two_sided))
-    prior = [FRICTION_PRIOR] * (1 + len(columns))
-    prior += [VISCOUS_PRIOR if told.viscous else NOT_TOLD, STRIBECK_PRIOR if told.stribeck else NOT_TOLD]
-    prior += [EXPONENT_PRIOR] * len(columns)
-    prior += [STRIBECK_SPEED_PRIOR, ASYMMETRY_PRIOR if told.asymmetry else NOT_TOLD]
-    prior += [AREA_PRIOR if told.areas else NOT_TOLD] * 2 + [OFFSET_PRIOR] * len(two_sided)
-    table = np.array(prior)
-    return Problem(readings, tuple(columns), size, speed, highest, free, table, two_sided)
+    scale = np.maximum(readings.scale, 1e-3 * size)
+    noise = readings.noise(readings.force) / scale if readings.samples else np.zeros(readings.count)
+    return Problem(
+        readings=readings,
+        columns=tuple(columns),
+        size=size,
+        speed=speed,
+        highest=highest,
+        free=free,
+        to_come=_way_to_come(readings) if told.drift else np.zeros(readings.count),
+        scale=scale,
+        noise=noise,
+        cluster=_clusters(readings),
+        sources=two_sided,
+    )
 
 
-def _solved(problem: Problem, weight: FloatArray, start: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Vector, and weighted Jacobian and rest with the rows of the prior: Levenberg and Marquardt within bounds."""
-    readings, prior = problem.readings, problem.prior
+def _way_to_come(readings: FrictionReadings) -> FloatArray:
+    """Share of the way of its source after each reading [-], shape (n,)."""
+    found = np.zeros(readings.count)
+    for source in np.unique(readings.source):
+        travel = readings.travel[inside := readings.source == source]
+        found[inside] = (travel.max() - travel) / max(float(np.ptp(travel)), 1e-9)
+    return found
+
+
+def _prior(problem: Problem, terms: _Terms) -> FloatArray:
+    """Prior of each parameter of a model; an absent term has `FIXED` about 0."""
+
+    def fixed(value: float) -> tuple[float, float, float, float]:
+        """Prior of a parameter that stays where it is."""
+        return value, FIXED, value, value
+
+    optional = (VISCOUS_PRIOR, STRIBECK_PRIOR, STRIBECK_PRIOR)
+    rows = [FRICTION_PRIOR] * (1 + len(problem.columns))
+    rows += [prior if there else fixed(0.0) for prior, there in zip(optional, terms.speed, strict=True)]
+    rows += [EXPONENT_PRIOR if m is None else fixed(m) for m in terms.exponents]
+    rows += [STRIBECK_SPEED_PRIOR]
+    optional = (ASYMMETRY_PRIOR, VISCOUS_ASYMMETRY_PRIOR, DRIFT_PRIOR)
+    there = (*terms.asymmetry, terms.drift)
+    rows += [prior if there else fixed(0.0) for prior, there in zip(optional, there, strict=True)]
+    rows += [AREA_PRIOR if terms.areas else fixed(0.0)] * 2 + [OFFSET_PRIOR] * len(problem.sources)
+    return np.array(rows)
+
+
+class _Weighting:
+    """Columns of readings so weighted that their errors are independent and of variance 1.
+
+    An error that readings of a cluster share is taken out as in a model of random effects: of each column, a share of
+    its mean over the cluster.
+    """
+
+    def __init__(self, problem: Problem, scatter: _Scatter) -> None:
+        self._cluster, self._count = problem.cluster, np.bincount(problem.cluster)
+        relative = np.hypot(problem.noise, scatter.within)
+        self._std = problem.scale * relative
+        shared = self._count * (scatter.between * np.bincount(self._cluster, 1.0 / relative) / self._count) ** 2
+        self._share = 1.0 - 1.0 / np.sqrt(1.0 + shared)
+        self.log_determinant = 2.0 * float(np.log(self._std).sum()) + float(np.log1p(shared).sum())
+
+    def of(self, columns: FloatArray) -> FloatArray:
+        """Weighted columns, shape (n, ...)."""
+        weighted = columns / self._std.reshape(-1, *[1] * (columns.ndim - 1))
+        flat = weighted.reshape(len(weighted), -1)
+        means = np.column_stack([np.bincount(self._cluster, each) for each in flat.T]) / self._count[:, np.newaxis]
+        return np.asarray((flat - (self._share[:, np.newaxis] * means)[self._cluster]).reshape(weighted.shape))
+
+
+def _fitted(problem: Problem, terms: _Terms, weighting: _Weighting, start: FloatArray) -> _Fit:
+    """Most probable vector by Levenberg and Marquardt within bounds."""
+    readings, prior = problem.readings, _prior(problem, terms)
     at, direction = readings.at, readings.at.direction[:, np.newaxis]
-    known = _layout(len(problem.columns)).asymmetry + 1
+    known = _layout(len(problem.columns)).drift + 1
 
     def both(vector: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Weighted rest and Jacobian at a vector, the rows of the prior last."""
-        friction, slopes = _magnitude(problem, vector, at)
+        friction, slopes = _magnitude(problem, vector, at, problem.to_come)
         rest = readings.force - direction[:, 0] * friction - problem.free @ vector[known:]
-        jacobian = -np.column_stack((direction * slopes, problem.free)) * weight[:, np.newaxis]
+        jacobian = -weighting.of(np.column_stack((direction * slopes, problem.free)))
         ahead = (vector - prior[:, 0]) / prior[:, 1]
-        return np.concatenate((rest * weight, ahead)), np.vstack((jacobian, np.diag(1.0 / prior[:, 1])))
+        return np.concatenate((weighting.of(rest), ahead)), np.vstack((jacobian, np.diag(1.0 / prior[:, 1])))
 
     low, high = prior[:, 2], prior[:, 3]
     vector = np.clip(start, low, high)
@@ -282,7 +453,19 @@ def _solved(problem: Problem, weight: FloatArray, start: FloatArray) -> tuple[Fl
             break
     vector = np.where(np.abs(vector) < NOTHING, 0.0, vector)
     rest, jacobian = both(vector)
-    return vector, jacobian, rest
+    normal = jacobian.T @ jacobian
+    evidence = -0.5 * (float(rest @ rest) + weighting.log_determinant + float(np.linalg.slogdet(normal)[1]))
+    evidence -= float(np.log(prior[:, 1]).sum()) + LOG_ODDS * terms.optional
+    return _Fit(
+        terms=terms,
+        prior=prior,
+        vector=vector,
+        information=normal,
+        covariance=np.asarray(np.linalg.inv(normal)),
+        rows=jacobian[: readings.count],
+        left=rest[: readings.count],
+        log_evidence=evidence,
+    )
 
 
 def _clusters(readings: FrictionReadings) -> IntArray:
@@ -293,60 +476,134 @@ def _clusters(readings: FrictionReadings) -> IntArray:
     return numbered(readings.source, readings.level)
 
 
-def _weights(
-    readings: FrictionReadings, residual: FloatArray, size: float, fitted: float, least: float = 0.0
-) -> tuple[FloatArray, float]:
-    """Weight of each reading [1/N], and the scatter of one more reading or stroke [-].
+def _scatter(problem: Problem, fit: _Fit) -> _Scatter:
+    """Scatter of the readings about a model.
 
-    ``residual`` is that of the magnitudes [N], shape (n,), after a fit of ``fitted`` effective parameters. The variance
-    of a reading is that within a cluster, and as many times that between clusters as the cluster has readings. The
-    latter is the geometric mean of that found, with its degrees of freedom, and of the prior (our choice), but at
-    ``least`` that standard deviation.
+    Within clusters by the analysis of variance, beyond the noise of the sensors. Between clusters the geometric mean of
+    that found, with its degrees of freedom, and of the prior (our choice).
     """
-    cluster = _clusters(readings)
-    share = residual / np.maximum(readings.scale, 1e-3 * size)
-    count = np.bincount(cluster)
-    mean = np.bincount(cluster, share) / count
-    within = float(np.sum((share - mean[cluster]) ** 2)) / max(len(share) - len(count), 1)
-    freedom = max(len(count) - fitted, 0.0)
-    found = max(float(np.sum(mean**2 - within / count)), 0.0) / max(freedom, 1.0)
-    of_prior = CLUSTER_FREEDOM / (CLUSTER_FREEDOM + freedom)
-    between = max(found, 1e-8) ** (1.0 - of_prior) * CLUSTER_PRIOR ** (2.0 * of_prior)
-    between = max(between, least**2)
-    variance = within + count[cluster] * between
-    scatter = math.sqrt(within / (float(count.mean()) if readings.are_samples else 1.0) + between)
-    return np.asarray(1.0 / (np.maximum(readings.scale, 1e-3 * size) * np.sqrt(variance))), scatter
+    readings, known = problem.readings, len(problem.free[0])
+    friction = _magnitude(problem, fit.vector, readings.at, problem.to_come)[0]
+    free = problem.free @ fit.vector[-known:] if known else 0.0
+    share = (readings.at.direction * (readings.force - free) - friction) / problem.scale
+    count = np.bincount(problem.cluster)
+    mean = np.bincount(problem.cluster, share) / count
+    freedom, noise = len(share) - len(count), float(np.mean(problem.noise**2))
+    squares = float(np.sum((share - mean[problem.cluster]) ** 2)) - freedom * noise
+    is_known = bool(problem.noise.any())
+    within = max(squares, 0.0) / max(freedom + WITHIN_FREEDOM * is_known, 1.0)
+    fitted = len(fit.vector) - float(np.sum(np.diag(fit.covariance) / fit.prior[:, 1] ** 2))
+    left = max(len(count) - fitted, 0.0)
+    found = max(float(np.sum(mean**2 - (within + noise) / count)), 0.0) / max(left, 1.0)
+    of_prior = CLUSTER_FREEDOM / (CLUSTER_FREEDOM + left)
+    between = max(found, SMALLEST_SCATTER**2) ** (1.0 - of_prior) * CLUSTER_PRIOR ** (2.0 * of_prior)
+    return _Scatter(max(math.sqrt(within), SMALLEST_SCATTER), math.sqrt(between))
 
 
-def fit_model(readings: FrictionReadings, columns: Sequence[Columns], told: Told) -> ModelFit:
-    """Most probable parameters and their covariance, with those of the `OPTIONAL` terms that are more probable.
+def _choices(told: Told, kinds: int, *, is_open: bool) -> dict[str, list[Any]]:
+    """What each field of `_Terms` may be."""
+    mixed = ((False, False), (True, False), (False, True)) if told.stribeck else ((False, False),)
+    sides = ((False, False), (True, False), (True, True)) if told.asymmetry else ((False, False),)
+    return {
+        'speed': [(viscous, *which) for viscous, which in product({told.viscous, is_open and told.viscous}, mixed)],
+        'asymmetry': list(sides),
+        'drift': sorted({told.drift, False}),
+        'areas': sorted({told.areas, False}),
+        'exponents': list(product((None,) if is_open else (*EXPONENTS.values(), None), repeat=kinds)),
+    }
+
+
+def _neighbours(terms: _Terms, choices: dict[str, list[Any]]) -> Iterator[_Terms]:
+    """Models that differ in one field; in the exponent of one kind, or in those of all kinds, which are then alike."""
+    for name, values in choices.items():
+        for value in values:
+            other = terms._replace(**{name: value})
+            if name == 'exponents':
+                changed = sum(one != two for one, two in zip(terms.exponents, other.exponents, strict=True))
+                if changed > 1 and len(set(other.exponents)) > 1:
+                    continue
+            yield other if other.speed[0] else other._replace(asymmetry=(other.asymmetry[0], False))
+
+
+def _is_told(problem: Problem, fit: _Fit) -> bool:
+    """Whether the readings tell asymmetry and drift from what is free in every model."""
+    layout = _layout(len(problem.columns))
+    std = np.sqrt(np.diag(fit.covariance))
+    looked_at = ((layout.asymmetry, fit.terms.asymmetry[0]), (layout.drift, fit.terms.drift))
+    return all(std[index] <= COLLINEAR * fit.prior[index, 1] for index, is_there in looked_at if is_there)
+
+
+class _Bend(NamedTuple):
+    """How far viscous friction may be from a line over the speed."""
+
+    variance: float  # [-] of the exponent, by readings and prior
+    compensated: FloatArray  # change of the parameters by which the readings are met, for an exponent of 1 more
+
+
+def _bend(problem: Problem, fit: _Fit, weighting: _Weighting) -> _Bend:
+    """The exponent of viscous friction beside the parameters of a model, to first order."""
+    if not fit.terms.speed[0]:
+        return _Bend(0.0, np.zeros(len(fit.vector)))
+    at = problem.readings.at
+    column = -weighting.of(at.direction * _bending(problem, fit.vector, at))
+    compensated = fit.covariance @ (fit.rows.T @ column)
+    alone = float(column @ column - (fit.rows.T @ column) @ compensated)
+    return _Bend(1.0 / (max(alone, 0.0) + 1.0 / BEND**2), compensated)
+
+
+def fit_model(readings: FrictionReadings, columns: Sequence[Columns], told: Told, *, is_open: bool = False) -> ModelFit:
+    """The most probable model, and all that are probable.
 
     The ``columns`` of the pressures are the seals of each kind; none for a friction without pressure. Terms that are
-    not ``told`` are 0.
+    not ``told`` are 0. With ``is_open``, viscous friction and free exponents stay, since other readings may tell them.
+    Models are compared by the scatter about that of all terms.
     """
-    problem = _problem(readings, columns, told)
-    vector = _start(problem)
-    scatter = CLUSTER_PRIOR
-    weight = 1.0 / (np.maximum(readings.scale, 1e-3 * problem.size) * scatter)
-    for _ in range(2):
-        vector, jacobian, left = _solved(problem, weight, vector)
-        fit = _model_fit(problem, vector, jacobian, left, scatter)
-        free = problem.free @ vector[fit.layout.asymmetry + 1 :]
-        residual = readings.at.direction * (readings.force - free) - fit.friction(readings.at)
-        fitted = len(vector) - float(np.sum(np.diag(fit.covariance) / problem.prior[:, 1] ** 2))
-        weight, scatter = _weights(readings, residual, problem.size, fitted)
+    problem, kinds = _problem(readings.as_means, columns, told), len(columns)
+    speed = (told.viscous, told.stribeck, told.stribeck)
+    everything = _Terms(speed, (told.asymmetry, False), told.drift, told.areas, (None,) * kinds)
+    start, scatter = _start(problem), _Scatter(CLUSTER_PRIOR, CLUSTER_PRIOR)
+    for _ in range(3):
+        chosen = _fitted(problem, everything, _Weighting(problem, scatter), start)
+        start, scatter = chosen.vector, _scatter(problem, chosen)
     # An area must not explain what strokes and pressures usually differ by.
-    unsure = _weights(readings, residual, problem.size, fitted, CLUSTER_PRIOR if told.areas else 0.0)[0]
-    optional = [sorted({getattr(told, name), False}) for name in OPTIONAL]
-    choices = [told._replace(**dict(zip(OPTIONAL, one, strict=True))) for one in product(*optional)]
-    odds = [
-        _log_evidence(_problem(readings, columns, one), unsure, vector)
-        - LOG_ODDS * sum(getattr(one, name) for name in OPTIONAL)
-        for one in choices
-    ]
-    problem = _problem(readings, columns, choices[int(np.argmax(odds))])
-    vector, jacobian, left = _solved(problem, weight, vector)
-    return _model_fit(problem, vector, jacobian, left, scatter)
+    unsure = scatter._replace(between=max(scatter.between, CLUSTER_PRIOR)) if told.areas else scatter
+    choices = _choices(told, kinds, is_open=is_open)
+    weights = _weighed(problem, everything, choices, _Weighting(problem, unsure), start)
+    _, chosen = max(weights.values(), key=lambda each: each[0])
+    for _ in range(2):
+        chosen = _fitted(problem, chosen.terms, _Weighting(problem, scatter), chosen.vector)
+        scatter = _scatter(problem, chosen)
+    weights[chosen.terms] = (weights[chosen.terms][0], chosen)
+    weighting = _Weighting(problem, scatter)
+    count = np.bincount(problem.cluster).mean() if readings.are_samples else 1.0
+    noise = float(np.mean(problem.noise**2))
+    return ModelFit(
+        problem=problem,
+        chosen=chosen,
+        vector=chosen.vector,
+        scatter=math.sqrt((scatter.within**2 + noise) / float(count) + scatter.between**2),
+        averaged=tuple((weight, each, _bend(problem, each, weighting)) for weight, each in weights.values()),
+    )
+
+
+def _weighed(
+    problem: Problem, everything: _Terms, choices: dict[str, list[Any]], weighting: _Weighting, start: FloatArray
+) -> dict[_Terms, tuple[float, _Fit]]:
+    """Probability and fit of each probable model, of those that a search from that of all terms meets."""
+    fits: dict[_Terms, _Fit] = {}
+
+    def evidence(terms: _Terms) -> float:
+        """Logarithm of the probability of a model; minus infinity if a term of it is not told from an offset."""
+        if terms not in fits:
+            fits[terms] = _fitted(problem, terms, weighting, start)
+        return fits[terms].log_evidence if _is_told(problem, fits[terms]) else -math.inf
+
+    best = everything._replace(asymmetry=(False, False), drift=False)  # what is told for certain
+    while evidence(other := max(_neighbours(best, choices), key=evidence)) > evidence(best):
+        best = other
+    each = np.exp([evidence(terms) - evidence(best) for terms in fits])
+    weights = zip(fits.items(), (each / each.sum()).tolist(), strict=True)
+    return {terms: (weight, fit) for (terms, fit), weight in weights if weight > SMALLEST_WEIGHT}
 
 
 def without_group(fit: ModelFit, out: BoolArray) -> ModelFit:
@@ -354,12 +611,12 @@ def without_group(fit: ModelFit, out: BoolArray) -> ModelFit:
 
     Parameters at a bound stay there.
     """
-    low, high = fit.problem.prior[:, 2], fit.problem.prior[:, 3]
+    low, high = fit.chosen.prior[:, 2], fit.chosen.prior[:, 3]
     margin = 1e-6 * (high - low)
     free = np.flatnonzero((fit.vector > low + margin) & (fit.vector < high - margin))
-    rows = fit.rows[out][:, free]
-    everything = np.linalg.pinv(fit.covariance, hermitian=True)[np.ix_(free, free)]
-    step = np.linalg.lstsq(everything - rows.T @ rows, rows.T @ fit.left[out], rcond=1e-14)[0]
+    rows = fit.chosen.rows[out][:, free]
+    everything = fit.chosen.information[np.ix_(free, free)]
+    step = np.linalg.lstsq(everything - rows.T @ rows, rows.T @ fit.chosen.left[out], rcond=1e-14)[0]
     vector = fit.vector.copy()
     vector[free] += step
     vector[fit.layout.linear] = np.maximum(vector[fit.layout.linear], 0.0)
@@ -383,23 +640,12 @@ def left_out(fit: ModelFit, readings: FrictionReadings) -> tuple[FloatArray, Flo
     return predicted, signed, np.array(vectors)
 
 
-def _log_evidence(problem: Problem, weight: FloatArray, start: FloatArray) -> float:
-    """Logarithm of the probability of the readings by the method of Laplace, but for a constant."""
-    _, jacobian, left = _solved(problem, weight, start)
-    determinant = float(np.linalg.slogdet(jacobian.T @ jacobian)[1])
-    return -0.5 * float(left @ left) - 0.5 * determinant - float(np.log(problem.prior[:, 1]).sum())
-
-
 def _start(problem: Problem) -> FloatArray:
-    kinds, start = len(problem.columns), problem.prior[:, 0].copy()
+    kinds = len(problem.columns)
+    layout = _layout(kinds)
+    start = np.zeros(layout.areas.stop + len(problem.sources))
     start[: kinds + 1] = 1.0 / (kinds + 1)
-    start[kinds + 1 : kinds + 3] = 0.1
-    start[_layout(kinds).offsets] = problem.readings.offsets[problem.sources] / problem.size
+    start[layout.viscous : layout.viscous + 2] = 0.1
+    start[layout.exponents], start[layout.speed] = EXPONENT_PRIOR[0], STRIBECK_SPEED_PRIOR[0]
+    start[layout.offsets] = problem.readings.offsets[problem.sources] / problem.size
     return start
-
-
-def _model_fit(
-    problem: Problem, vector: FloatArray, jacobian: FloatArray, left: FloatArray, scatter: float
-) -> ModelFit:
-    count, covariance = problem.readings.count, np.asarray(np.linalg.inv(jacobian.T @ jacobian))
-    return ModelFit(problem, vector, covariance, jacobian[:count], left[:count], scatter)

@@ -37,6 +37,8 @@ LARGEST_FORCE = 1e6  # [N] likewise
 LARGEST_SEAL_AREA = 2e-3  # [m^2] friction over pressure: no seal is larger (our choice)
 SMALLEST_SEAL_AREA = 6e-8  # [m^2] friction over pressure: no seal is smaller (our choice)
 LARGEST_SCATTER = 0.3  # of the friction at one pressure, where only one was measured (our choice)
+OUTER = 0.1  # of the samples of a stroke at either end of their order: left out of its mean (our choice)
+OF_MIDDLE = 1.06  # variance of the mean of the others, if they are normal, over that of the mean of all
 LARGEST_AREA_ERROR = 5.0  # of the friction: largest change of the offset over the pressures (our choice)
 
 
@@ -213,12 +215,21 @@ class FrictionReadings:
         of_levels = np.maximum(np.abs(self.half_ranges[0]), 1e-12)
         return np.asarray(of_levels[np.searchsorted(list(self.levels), self.level)])
 
+    @cached_property
+    def as_means(self) -> 'FrictionReadings':
+        """The readings by the mean of the samples behind each, without `OUTER` of them: less noise than by medians."""
+        if self.are_samples or not self.samples:
+            return self
+        out = [int(OUTER * len(one)) for one in self.samples]
+        middles = [np.sort(one)[k : len(one) - k].mean() for one, k in zip(self.samples, out, strict=True)]
+        return replace(self, force=np.array(middles))
+
     def noise(self, rest: FloatArray) -> FloatArray:
         r"""Standard deviation by the noise of the sensors [N] of each reading, shape (n,); 0 where it is not known.
 
         Noise differs from sample to sample, friction does not: :math:`s^2 = \overline{(x_{i+1} - x_i)^2} / 2` of
-        samples [vonNeumann1941]_, and :math:`\pi s^2 / 2 n` of the median of n. ``rest`` is the force without friction
-        [N], shape (n,).
+        samples [vonNeumann1941]_, and :math:`1.06 s^2 / n` of the mean (`as_means`) of n. ``rest`` is the force
+        without friction [N], shape (n,).
         """
         if self.are_samples:
             one_motion = (np.diff(self.at.direction) == 0.0) & (np.diff(self.source) == 0)
@@ -226,7 +237,7 @@ class FrictionReadings:
         if not self.samples:
             return np.zeros(self.count)
         return np.array(
-            [math.sqrt(0.25 * math.pi * float(np.mean(np.diff(one) ** 2)) / len(one)) for one in self.samples]
+            [math.sqrt(0.5 * OF_MIDDLE * float(np.mean(np.diff(one) ** 2)) / len(one)) for one in self.samples]
         )
 
     @cached_property

@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.identification.fitting import LawFit, root_mean_square
+from seal_friction_ros.core.identification.candidate_laws import CandidateLaw
+from seal_friction_ros.core.identification.fitting import LawFit, model_of, root_mean_square
 from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.validation import CrossValidation
 
@@ -137,13 +138,20 @@ class SettledReadings(NamedTuple):
     relative_std: float  # [-] of the friction, because that of the settled seal is extrapolated
 
 
-def settled_readings(readings: FrictionReadings, offsets: FloatArray) -> SettledReadings | None:
+def settled_readings(
+    readings: FrictionReadings, offsets: FloatArray, everything: CandidateLaw | None = None
+) -> SettledReadings | None:
     """Readings of the settled seal: the friction of each run with an evident drift, times its settled share.
 
     None for swept logs, and where no drift is evident. The standard deviation of the settled shares counts as common to
-    all pressures: they are extrapolated by one model (our choice).
+    all pressures: they are extrapolated by one model (our choice). Where no pressure has `FEWEST_STROKES` strokes, it
+    is the drift over all pressures of a source, beside ``everything`` else (the law of all terms).
     """
-    of_runs = [] if readings.are_samples else drifts(readings, offsets)
+    if readings.are_samples:
+        return None
+    of_runs = drifts(readings, offsets)
+    if not of_runs and everything is not None:
+        return _at_the_end(readings, offsets, everything)
     if not any(drift.is_evident for drift in of_runs):
         return None
     share = np.ones(readings.count)
@@ -151,6 +159,20 @@ def settled_readings(readings: FrictionReadings, offsets: FloatArray) -> Settled
         share[(readings.source == drift.source) & (readings.level == drift.level)] = drift.settled_share
     unsure = np.array([drift.settled_std / drift.settled_share for drift in of_runs])
     return SettledReadings(readings.scaled(share, offsets), share, root_mean_square(unsure))
+
+
+def _at_the_end(readings: FrictionReadings, offsets: FloatArray, everything: CandidateLaw) -> SettledReadings | None:
+    """Readings as at the end of the way of their source, by a linear drift over it; None where none is probable."""
+    if not len(readings.travel) or readings.count < FEWEST_STROKES:
+        return None
+    model = model_of(everything, readings, drift=True)
+    drift, error = model.drift
+    if not drift:
+        return None
+    to_come = model.problem.to_come
+    mean = float(to_come.mean())
+    share = 1.0 / (1.0 + drift * to_come)
+    return SettledReadings(readings.scaled(share, offsets), share, error * mean / (1.0 + drift * mean))
 
 
 def as_measured(found: CrossValidation, share: FloatArray) -> CrossValidation:

@@ -15,14 +15,25 @@ from scipy.optimize import nnls
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.identification import friction_model
-from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, ParameterValues
-from seal_friction_ros.core.identification.fitting import fit, offsets_of, root_mean_square, values_of_model
+from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, OperatingConditions, ParameterValues
+from seal_friction_ros.core.identification.fitting import (
+    LawFit,
+    covariance_of_terms,
+    fit,
+    offsets_of,
+    root_mean_square,
+    values_of_model,
+)
 from seal_friction_ros.core.identification.friction_model import ModelFit
 from seal_friction_ros.core.identification.readings import FrictionReadings
 
 Ticks = Callable[[int], None]
-LAW_ERROR = 0.02  # [-] standard deviation of a law between the speeds and pressures of its readings (our choice),
-CURVED = 0.04  # [-] and of one whose readings are strokes: the few speeds of a test show no curve over the speed
+FASTER, SLOWER = (
+    1.5,
+    0.7,
+)  # [-] of the fastest and slowest speed of the readings: band of a law with priors (our choice)
+SPEEDS = 6  # at which it is looked at
+MOST_CONDITIONS = 200  # readings whose pressures it is looked at
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +79,13 @@ def cross_validate(
     return CrossValidation(predicted, deviation, group_losses(readings, deviation), tuple(each))
 
 
+def model_with_priors(law: CandidateLaw, readings: FrictionReadings) -> ModelFit:
+    """The model behind the fit of a law with priors."""
+    return cast(ModelFit, fit(law, readings).model)
+
+
 def _left_out_of_model(law: CandidateLaw, readings: FrictionReadings) -> CrossValidation:
-    model = cast(ModelFit, fit(law, readings).model)  # a law with a prior has one
+    model = model_with_priors(law, readings)
     predicted, deviation, vectors = friction_model.left_out(model, readings)
     seals = readings.at.pressure.shape[1]
     values = tuple(values_of_model(law, replace(model, vector=vector), seals) for vector in vectors)
@@ -130,6 +146,18 @@ def jackknife_covariance(estimates: FloatArray) -> FloatArray:
     return np.asarray((groups - 1) / groups * off.T @ off)
 
 
+def covariance_of(
+    found: LawFit, left_out: CrossValidation, seals: int, terms: Callable[[ParameterValues], Sequence[float]]
+) -> FloatArray:
+    """Covariance of numbers that follow from the parameters of a law: by its posterior, else by the jackknife."""
+    by_posterior = covariance_of_terms(found, seals, terms)
+    return (
+        jackknife_covariance(np.array([terms(each) for each in left_out.values]))
+        if by_posterior is None
+        else by_posterior
+    )
+
+
 def table_of(values: Sequence[ParameterValues], names: Sequence[str]) -> FloatArray:
     """Parameters of several fits as a table, shape (fits, names)."""
     return np.array([[each[name] for name in names] for each in values])
@@ -180,13 +208,15 @@ def _two_parts(friction: FloatArray, squares: FloatArray) -> PredictionUncertain
 def model_uncertainty(model: ModelFit, readings: FrictionReadings, in_addition: float) -> PredictionUncertainty:
     r"""Standard deviation of the friction by a model with priors, which its readings were fitted by.
 
-    .. math:: \sigma^2 = g^T C\,g + (q\,F)^2\,(N / (N - k) - \overline{n^2} / \overline{r^2})
+    .. math:: \sigma^2 = \sigma_m^2 + (q\,F)^2\,(N / (N - k) - \overline{n^2} / \overline{r^2})
 
-    with the covariance C of the posterior, and what the model misses: the quantile q that holds 95 % of the rest r of
-    the readings, over the mean friction F of their pressure, without the noise n of their sensors, which is none of the
-    friction; N readings, k terms fitted. `LAW_ERROR` or `CURVED`, and ``in_addition`` as of `prediction_uncertainty`,
-    are added in square. Our choice.
+    with the standard deviation :math:`\sigma_m` of the posterior (`ModelFit.std`) at the pressures of the readings and
+    `SLOWER` to `FASTER` times their speeds, and what the model misses: the quantile q that holds 95 % of the rest r of
+    the readings, over the mean friction F of their pressure, without the noise n of their sensors, which is none of
+    the friction; N readings, k terms fitted. ``in_addition``, as of `prediction_uncertainty`,
+    is added in square. Our choice.
     """
+    readings = readings.as_means
     friction = model.friction(readings.at)
     rest = readings.magnitudes(model.offsets) - friction
     fitted = 0 if readings.are_samples else int(model.told.sum())
@@ -194,10 +224,15 @@ def model_uncertainty(model: ModelFit, readings: FrictionReadings, in_addition: 
     noise = float(np.mean(readings.noise(readings.at.direction * rest) ** 2))
     quantile = float(np.quantile(np.abs(rest) / readings.scale, 0.95)) / BAND_95
     missed = quantile**2 * max(squares - noise, 0.0) / max(float(np.mean(rest**2)), 1e-24)
-    relative, absolute = _two_parts(friction, model.std(readings.at) ** 2 + missed * readings.scale**2)
-    return PredictionUncertainty(
-        math.hypot(relative, LAW_ERROR if readings.are_samples else CURVED, in_addition), absolute
-    )
+    some = np.unique(np.linspace(0, readings.count - 1, min(readings.count, MOST_CONDITIONS)).round().astype(np.int64))
+    at, scale = readings.at.taken(some), readings.scale[some]
+    speed = np.abs(readings.at.velocity)
+    if np.isfinite(speed).all() and speed.min() > 0.0:
+        speeds = np.geomspace(SLOWER * float(speed.min()), FASTER * float(speed.max()), SPEEDS)
+        at = OperatingConditions(*(np.concatenate([column] * SPEEDS) for column in at))
+        at, scale = at._replace(velocity=at.direction * np.repeat(speeds, len(some))), np.tile(scale, SPEEDS)
+    relative, absolute = _two_parts(model.friction(at), model.std(at) ** 2 + missed * scale**2)
+    return PredictionUncertainty(math.hypot(relative, in_addition), absolute)
 
 
 def deviations_in_std(
@@ -210,11 +245,14 @@ def deviations_in_std(
 ) -> FloatArray:
     """Deviations of ``tested`` over the standard deviation of a band that is made from ``trained`` alone [-], (n,).
 
-    The band comes from the groups of ``trained``, each left out in turn. ``in_addition`` is as of
-    `prediction_uncertainty`.
+    The band comes from the groups of ``trained``, each left out in turn; that of a law with priors from its posterior.
+    ``in_addition`` is as of `prediction_uncertainty`.
     """
-    inner = cross_validate(law, trained, near, tick)
-    band = prediction_uncertainty(inner.predicted, inner.deviation, len(trained.groups), in_addition)
+    if law.has_prior:
+        band = model_uncertainty(model_with_priors(law, trained), trained, in_addition)
+    else:
+        inner = cross_validate(law, trained, near, tick)
+        band = prediction_uncertainty(inner.predicted, inner.deviation, len(trained.groups), in_addition)
     _, friction, deviation = predict(law, trained, tested, near)
     return np.asarray(np.abs(deviation) / np.maximum(band.std(friction), 1e-12))
 
@@ -225,9 +263,18 @@ def deviations_of_left_out(
     """Deviations of each group over the standard deviation of a band that was made without it [-], shape (n,).
 
     For each group, law and uncertainty come from the other groups alone, the uncertainty by leaving out each of those
-    in turn. Two groups are too few for that: the band of all readings is used.
+    in turn. Two groups are too few for that: the band of all readings is used. The terms of a law with priors are those
+    that all readings show.
     """
     ratios = np.empty(readings.count)
+    if law.has_prior:
+        model = model_with_priors(law, readings)
+        friction, deviation, _ = friction_model.left_out(model, readings)
+        for out in readings.groups:
+            others = friction_model.without_group(model, out)
+            std = model_uncertainty(others, readings.taken(~out), 0.0).std(friction[out])
+            ratios[out] = np.abs(deviation[out]) / np.maximum(std, 1e-12)
+        return ratios
     for out in readings.groups:
         trained = readings.taken(~out) if len(readings.groups) >= 3 else readings
         ratios[out] = deviations_in_std(law, trained, readings.taken(out), near, tick=tick)

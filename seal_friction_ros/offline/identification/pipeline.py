@@ -24,7 +24,13 @@ from seal_friction_ros.core.friction.seal_file import parse_part, parse_seal
 from seal_friction_ros.core.identification import diagnostics, fitting, run_in, runs, seal_kinds, validation
 from seal_friction_ros.core.identification.breakaway import BreakawayFit, fit_breakaway
 from seal_friction_ros.core.identification.calibration import calibration
-from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, SealKind, candidate_laws
+from seal_friction_ros.core.identification.candidate_laws import (
+    CandidateLaw,
+    SealKind,
+    Variation,
+    candidate_laws,
+    law_of_all_terms,
+)
 from seal_friction_ros.core.identification.force_correction import ForceCorrection, force_correction
 from seal_friction_ros.core.identification.friction_model import Told
 from seal_friction_ros.core.identification.prepare_readings import with_predictable_groups
@@ -251,7 +257,10 @@ def select_law(
         scores = _scored(data.used, data.ring, data.sources.has_fitted_load, advance)
     best = recommended(scores, rises=rises_over_pressures(data.used))
     readings, share, is_no_run_in = data.used, np.ones(data.used.count), False
-    settled = run_in.settled_readings(readings, fitting.offsets_of(readings, best.fit.friction(readings.at)))
+    offsets = fitting.offsets_of(readings, best.fit.friction(readings.at))
+    settled = run_in.settled_readings(
+        readings, offsets, law_of_all_terms(_variation(readings, data.sources.has_fitted_load), data.used.kinds)
+    )
     if settled is not None and len(data.used.levels) >= FEWEST_TO_COMPARE:
         of_settled = _scored(settled.readings, data.ring, data.sources.has_fitted_load)
         best_settled = recommended(of_settled, rises=rises_over_pressures(settled.readings))
@@ -320,10 +329,14 @@ def _recommended(readings: FrictionReadings, ring: Ring | None, has_fitted_load:
 def _scored(
     readings: FrictionReadings, ring: Ring | None, has_fitted_load: bool, tick: validation.Ticks = lambda _: None
 ) -> tuple[LawScore | NotScored, ...]:
-    variation = variation_of(readings)
-    if has_fitted_load:  # asymmetry is not identifiable: the fitted load holds it
-        variation = variation._replace(asymmetry=False)
+    variation = _variation(readings, has_fitted_load)
     return score_ladder(candidate_laws(variation, *(ring or ())), readings, variation, tick)
+
+
+def _variation(readings: FrictionReadings, has_fitted_load: bool) -> Variation:
+    """What the readings vary; asymmetry is not identifiable beside a fitted load, which holds it."""
+    found = variation_of(readings)
+    return found._replace(asymmetry=found.asymmetry and not has_fitted_load)
 
 
 def assess(
@@ -347,17 +360,25 @@ def assess(
     else:
         of_band = between.of_band
     unseen = 0.0 if found.model else collinear_spread(selection.scores, found, used)
+    settled, of_settled = selection.settled, None
     if found.model is None:
         both = math.hypot(of_band, unseen)
         uncertainty = validation.prediction_uncertainty(left_out.predicted, left_out.deviation, groups, both)
     else:
         uncertainty = validation.model_uncertainty(found.model, used, spread)
+    if settled is not None:
+        model = settled.fit.model
+        of_settled = uncertainty if model is None else validation.model_uncertainty(model, settled.readings, spread)
+        of_settled = of_settled._replace(relative=math.hypot(of_settled.relative, settled.relative_std))
     with progress('test the band', groups * (groups - 1)) as advance:
         coverage = validation.band_coverage(selection.law, selection.readings, found.values, advance)
     names = [parameter.name for parameter in selection.law.parameters]
-    errors = validation.jackknife_errors(validation.table_of(left_out.values, names))
+    covariance = validation.covariance_of(
+        found, left_out, used.at.pressure.shape[1], lambda each: [each[n] for n in names]
+    )
     return LawQuality(
         uncertainty=uncertainty,
+        of_settled=of_settled,
         between_runs=between,
         is_stated=run_to_run is not None,
         changes=diagnostics.shared_levels(everything) + diagnostics.swept_logs_compared(used, found),
@@ -368,7 +389,7 @@ def assess(
         repeatability=diagnostics.repeatability(used, found.offsets),
         drifts=[] if used.are_samples else run_in.drifts(everything, offsets),
         breakaway=_breakaway(data, found),
-        standard_errors=dict(zip(names, errors.tolist(), strict=True)),
+        standard_errors=dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True)),
     )
 
 

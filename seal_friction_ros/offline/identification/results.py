@@ -1,6 +1,5 @@
 """Records of an identification, and its documents: the seal file and the numbers for JSON."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
@@ -29,8 +28,7 @@ from seal_friction_ros.core.identification.temperature import TemperatureFit
 from seal_friction_ros.core.identification.validation import (
     CrossValidation,
     PredictionUncertainty,
-    jackknife_covariance,
-    table_of,
+    covariance_of,
 )
 from seal_friction_ros.offline.identification.presliding import (
     IdentifiedPresliding,
@@ -112,6 +110,7 @@ class LawQuality:
     """Uncertainty of the selected law."""
 
     uncertainty: PredictionUncertainty  # standard deviation of a new reading, all seals
+    of_settled: PredictionUncertainty | None  # the same of the settled seal; None without run-in
     between_runs: BetweenRuns
     """relative standard deviation between runs that is added to what readings left out deviate by"""
     is_stated: bool  # whether the user gave it
@@ -181,7 +180,7 @@ def seal_document(
     values = rounded_numbers(law.of_one_seal((selection.fit if settled is None else settled.fit).values)[number])
     of_settled = '' if settled is None else ', of the settled seal'
     of_kind = f'{kind.name} fitted together with the other kinds of seals of the cylinder: ' if kind.name else ''
-    relative = math.hypot(quality.uncertainty.relative, 0.0 if settled is None else settled.relative_std)
+    new_reading = quality.uncertainty if settled is None else quality.of_settled or quality.uncertainty
     files = ', '.join(file.name for file in data.sources.files)
     document: dict[str, Any] = {
         'name': name,
@@ -198,7 +197,7 @@ def seal_document(
     stiction, ratio = (
         (terms.get('stribeck_friction', 0.0), 0.0) if quality.breakaway is None else quality.breakaway[1:3]
     )
-    uncertainty = {'relative_std': relative, 'absolute_std': quality.uncertainty.absolute / seals}
+    uncertainty = {'relative_std': new_reading.relative, 'absolute_std': new_reading.absolute / seals}
     numbers = {'stiction': stiction, 'stiction_ratio': ratio, 'uncertainty': uncertainty}
     document |= rounded_numbers({**numbers, 'identified_pressure': _identified_pressure(data, number)})
     speed = np.abs(data.used.at.velocity)
@@ -219,15 +218,21 @@ def seal_document(
 
 
 def _covariance(selection: LawSelection, number: int) -> dict[str, Any]:
-    """Covariance of the parameters of one seal of a kind, by fits without each group; of a term that is none: prior."""
+    """Covariance of the parameters of one seal of a kind; of a term that is none: its prior."""
     law, model = selection.law, selection.fit.model
     terms = list(dict.fromkeys(p.name.rpartition('.')[2] for p in law.parameters))  # without the name of a kind
-    of_one = [law.of_one_seal(each)[number] for each in selection.validation.values]
-    covariance = jackknife_covariance(table_of(of_one, terms))
+    seals = selection.readings.at.pressure.shape[1]
+
+    def of_one_seal(values: Mapping[str, float]) -> list[float]:
+        """Terms of one seal."""
+        of_one = law.of_one_seal(values)[number]
+        return [of_one[term] for term in terms]
+
+    covariance = covariance_of(selection.fit, selection.validation, seals, of_one_seal)
     std = np.sqrt(np.diag(covariance))
-    none = {} if model is None else fitting.std_of_none(law, model, selection.readings.at.pressure.shape[1])
+    none = {} if model is None else fitting.std_of_none(law, model, seals)
     of_prior = law.of_one_seal(selection.fit.values | none)[number]
-    std = np.array([of_prior[term] if term in none else found for term, found in zip(terms, std, strict=True)])
+    std = np.array([max(of_prior[t], found) if t in none else found for t, found in zip(terms, std, strict=True)])
     correlation = np.clip(covariance / np.maximum(np.outer(std, std), 1e-300), -1.0, 1.0)
     return {'terms': terms, 'std': std, 'correlation': correlation[np.triu_indices(len(terms), 1)]}
 
@@ -425,7 +430,9 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
             'told_apart_std': quality.told_apart,
             'calibration': {name: getattr(quality.calibration, name).tolist() for name in Calibration._fields[:3]},
             'drift': [level.drift for level in levels],
-            'settled': selection.settled and _settled_numbers(selection.settled, quality),
+            'settled': selection.settled
+            and quality.of_settled
+            and _settled_numbers(selection.settled, quality.of_settled),
             'run_in': _run_in_numbers(data, quality.drifts),
         }
     )
@@ -471,18 +478,17 @@ def _run_in_numbers(data: IdentificationData, drifts: Sequence[Drift]) -> list[d
     ]
 
 
-def _settled_numbers(settled: SettledLaw, quality: LawQuality) -> dict[str, Any]:
+def _settled_numbers(settled: SettledLaw, uncertainty: PredictionUncertainty) -> dict[str, Any]:
     """The settled seal: friction at each pressure in use, from its readings and by its law."""
     readings = settled.readings
     fitted = readings.level_means(settled.fit.friction(readings.at))
-    relative = math.hypot(quality.uncertainty.relative, settled.relative_std)
     return {
         'parameters': settled.fit.values,
         'relative_std_of_settling': settled.relative_std,
         'pressure_Pa': readings.level_pressures.tolist(),
         'measured_N': readings.half_ranges[0],
         'fitted_N': fitted,
-        'std_N': np.hypot(relative * fitted, quality.uncertainty.absolute),
+        'std_N': uncertainty.std(fitted),
     }
 
 

@@ -119,6 +119,22 @@ def test_viscous_stribeck_and_asymmetry_add_up_on_top_of_coulomb_friction(veloci
     assert sliding_friction_of_seals(numbers, 1e6, 0.0, speed, direction) == pytest.approx(sliding)
 
 
+@pytest.mark.parametrize('velocity', [-0.03, 0.03])
+def test_mixed_friction_follows_the_pressure_and_a_film_has_an_asymmetry_of_its_own(velocity):
+    terms = VelocityTerms(
+        viscous_friction=120.0, stribeck_velocity=0.02, asymmetry=0.25, stribeck_ratio=0.4, viscous_asymmetry=-0.2
+    )
+    law = PressurePowerLaw(2.0, 1.5, 1.0)
+    seals = (MountedSeal(seal_of(law, velocity_terms=terms), 'a'),)
+    side = math.copysign(1.0, velocity)
+    for bar in (0.0, 10.0, 40.0):
+        coulomb = 2.0 + 1.5 * bar
+        sliding = coulomb * (1.0 + 0.4 * math.exp(-1.5)) + 120.0 * 0.03 * (1.0 - 0.2 * side)
+        found = actuator_friction(seals, bar * 1e5, 0.0, velocity)
+        assert found.coulomb_friction == pytest.approx(coulomb)
+        assert found.coulomb_friction + found.velocity_friction == pytest.approx(sliding * (1.0 + 0.25 * side))
+
+
 def test_at_rest_velocity_adds_nothing_and_slow_sliding_has_the_whole_stribeck_friction():
     terms = VelocityTerms(stribeck_friction=4.0, stribeck_velocity=0.02)
     seals = (MountedSeal(seal_of(ConstantCoulomb(7.0), velocity_terms=terms), 'a'),)
