@@ -79,7 +79,7 @@ def places(document: Any, above: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ..
 def test_no_configuration_ends_the_view():
     """One value of a good one is another, or missing: it is read or refused, and the view goes on."""
     chance, taken = random.Random(43), [0, 0]  # noqa: S311  no secret
-    for number in range(400):
+    for number in range(1200):
         document = json.loads(TEXTS[number % 2])
         *above, last = chance.choice(list(places(document)))
         node = document
