@@ -165,7 +165,7 @@ class RunCollector:
     def run(self, source: ActuatorBag) -> RecordedRun:
         """Arrays of all messages so far; an input that cannot be a measurement becomes NaN. BagError: no estimate."""
         if not self.stamps:
-            raise BagError(f'{source.path}: the index lists estimates, but the bag holds none')
+            raise BagError(f'{source.path}: no estimates: none of those in its index, or no velocity')
         stamps = np.frombuffer(self.stamps, dtype=np.int64)
         columns = [np.frombuffer(column, dtype=np.float64) for column in self._columns]
         values: dict[str, Any] = dict(zip(_COLUMNS, columns, strict=True))

@@ -100,7 +100,7 @@ def completed_on(
                 done.add(future)
                 lonely_since = _lonely_since(client, lonely_since)
                 continue
-            number = numbers.pop(future)
+            number, lonely_since = numbers.pop(future), None
             if outcome.error and stop_at_error:
                 waiting.clear()
                 for later in [one for one, other in numbers.items() if other > number]:
