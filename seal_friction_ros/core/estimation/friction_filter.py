@@ -260,6 +260,15 @@ def begun(reading: Reading) -> FrictionFilter:
 
 
 @compilable
+def _predicted_terms(t: Terms, way: float, kept: float, fits: float) -> Terms:
+    """State after a way [m]: the offset takes its gradient along, shares of n and u are left."""
+    return Terms(
+        t.scale, t.coulomb, t.viscous, t.asymmetry, t.offset + way * t.gradient, t.gradient, kept * t.remainder,
+        fits * t.misfit,
+    )  # fmt: skip
+
+
+@compilable
 def _predicted(
     known: FrictionFilter, reading: Reading, fits: float, elapsed: float, moved: float, longest: float
 ) -> Covariance:
@@ -294,6 +303,16 @@ def _predicted(
 
 
 @compilable
+def _stroke_after(known: FrictionFilter, reading: Reading) -> tuple[float, float, float, float]:
+    """`FrictionFilter.stroke`, ``longest``, ``gradient`` and ``strayed`` before a reading is learnt from."""
+    stroke, longest, now = abs(reading.way), known.longest, known.terms.gradient
+    if reading.direction == known.direction:
+        strayed = known.strayed + reading.way * (now - known.gradient)
+        return known.stroke + stroke, longest, known.gradient, strayed
+    return stroke, known.stroke if known.stroke > longest else longest, now, 0.0
+
+
+@compilable
 def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
     """Filter after one more reading: predict, look for a step, correct, and follow what is left."""
     if known.stamp == NEVER:
@@ -302,19 +321,9 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
     moved = elapsed if elapsed < LONGEST_STEP else LONGEST_STEP
     kept, law = REMAINDER_TIME / (REMAINDER_TIME + elapsed), reading.friction
     fits = MISFIT_RANGE / (MISFIT_RANGE + 2.0 * abs(law - known.friction) / (law + known.friction))
-    before = known.terms
-    stroke, longest, gradient, strayed = abs(reading.way), known.longest, before.gradient, 0.0
-    if reading.direction == known.direction:
-        stroke += known.stroke
-        gradient = known.gradient
-        strayed = known.strayed + reading.way * (before.gradient - gradient)
-    elif known.stroke > longest:
-        longest = known.stroke
-    offset = before.offset + reading.way * before.gradient
-    terms = Terms(
-        before.scale, before.coulomb, before.viscous, before.asymmetry, offset, before.gradient,
-        kept * before.remainder, fits * before.misfit,
-    )  # fmt: skip
+    stroke, longest, gradient, strayed = _stroke_after(known, reading)
+    terms = _predicted_terms(known.terms, reading.way, kept, fits)
+    offset = terms.offset
     covariance = _predicted(known, reading, fits, elapsed, moved, stroke if stroke > longest else longest)
     innovation = reading.force - expected(terms, reading)
     usual = known.unexplained.usual

@@ -352,18 +352,18 @@ class _Body:
         return Runtime(f'({self._runtime(a).code} {_COMPARED[type(kind)]} {self._runtime(b).code})', bool)
 
     def _of_boolop(self, node: ast.BoolOp) -> Value:
-        if any(isinstance(each, Runtime) and each.kind is not bool for each in map(self._value, node.values)):
-            raise UntranslatableError('"and" or "or" for a number')
-        return self._test(node)
+        return self._test(node, is_value=True)
 
-    def _test(self, node: ast.expr) -> Value:
-        """Truth of a value."""
+    def _test(self, node: ast.expr, *, is_value: bool = False) -> Value:
+        """Truth of a value; as a value itself, `and` and `or` are those of truths alone."""
         if isinstance(node, ast.BoolOp):
-            is_or = isinstance(node.op, ast.Or)
-            return _joined([self._test(each) for each in node.values], '||' if is_or else '&&', decisive=is_or)
+            is_or, tests = isinstance(node.op, ast.Or), [self._test(each, is_value=is_value) for each in node.values]
+            return _joined(tests, '||' if is_or else '&&', decisive=is_or)
         value = self._value(node)
         if isinstance(value, Static):
             return Static(bool(value.value))
+        if is_value and value.kind is not bool:
+            raise UntranslatableError('"and" or "or" for a number')
         return value if value.kind is bool else Runtime(f'({value.code} != 0)', bool)
 
     def _of_ifexp(self, node: ast.IfExp) -> Value:

@@ -271,6 +271,15 @@ def test_a_sudden_force_sum_is_no_load_at_once_if_the_rest_does_not_explain_it(r
     assert found.outlook.status != 0
 
 
+def test_a_friction_that_doubled_under_a_change_at_rest_is_in_the_band_until_a_reversal_tells_it():
+    """Until then nothing tells it from a load."""
+    doubled = stroke_with(loaded_at_rest(40.0), 80.0)
+    assert learnt(doubled).scale == pytest.approx(1.0, abs=0.05)
+    assert BAND_95 * std_at(doubled, 0.02) > 40.0
+    back = stroke_with(doubled, -80.0, velocity=-0.02)
+    assert learnt(back).scale == pytest.approx(2.0, rel=0.1) or back.outlook.status != 0
+
+
 def test_a_slow_motion_that_is_forgotten_does_not_forget_the_load_of_the_rest_before():
     crept = adapted(moving(2.0, lambda time: 0.002 * (1 - 2 * (int(time) % 2)), lambda _: 0.0))
     rest = moving(1.5, lambda _: 0.0, lambda time: 40.0 * (time > 0.5), crept.stamp + SECOND // 100)
