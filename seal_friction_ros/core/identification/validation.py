@@ -28,12 +28,10 @@ from seal_friction_ros.core.identification.friction_model import ModelFit
 from seal_friction_ros.core.identification.readings import FrictionReadings
 
 Ticks = Callable[[int], None]
-FASTER, SLOWER = (
-    1.5,
-    0.7,
-)  # [-] of the fastest and slowest speed of the readings: band of a law with priors (our choice)
-SPEEDS = 6  # at which it is looked at
-MOST_CONDITIONS = 200  # readings whose pressures it is looked at
+# The band of a law with priors holds between these shares of the slowest and the fastest speed driven (our choice).
+SLOWER, FASTER = 0.7, 1.5  # [-]
+SPEEDS = 6  # at which it is computed,
+MOST_CONDITIONS = 200  # at the pressures of so many readings
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,16 +149,9 @@ def covariance_of(
 ) -> FloatArray:
     """Covariance of numbers that follow from the parameters of a law: by its posterior, else by the jackknife."""
     by_posterior = covariance_of_terms(found, seals, terms)
-    return (
-        jackknife_covariance(np.array([terms(each) for each in left_out.values]))
-        if by_posterior is None
-        else by_posterior
-    )
-
-
-def table_of(values: Sequence[ParameterValues], names: Sequence[str]) -> FloatArray:
-    """Parameters of several fits as a table, shape (fits, names)."""
-    return np.array([[each[name] for name in names] for each in values])
+    if by_posterior is not None:
+        return by_posterior
+    return jackknife_covariance(np.array([terms(each) for each in left_out.values]))
 
 
 class PredictionUncertainty(NamedTuple):

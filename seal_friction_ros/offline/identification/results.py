@@ -180,7 +180,7 @@ def seal_document(
     values = rounded_numbers(law.of_one_seal((selection.fit if settled is None else settled.fit).values)[number])
     of_settled = '' if settled is None else ', of the settled seal'
     of_kind = f'{kind.name} fitted together with the other kinds of seals of the cylinder: ' if kind.name else ''
-    new_reading = quality.uncertainty if settled is None else quality.of_settled or quality.uncertainty
+    new_reading = quality.of_settled or quality.uncertainty
     files = ', '.join(file.name for file in data.sources.files)
     document: dict[str, Any] = {
         'name': name,

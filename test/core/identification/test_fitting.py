@@ -38,7 +38,6 @@ from seal_friction_ros.core.identification.validation import (
     jackknife_errors,
     plain_mean,
     prediction_uncertainty,
-    table_of,
 )
 
 POWER = {'friction_at_no_pressure': 5.0, 'friction_at_one_bar': 0.9, 'pressure_exponent': 0.65}
@@ -139,7 +138,7 @@ def test_standard_errors_are_those_of_repeating_it_all():
         found = fit(LAW, readings)
         estimates.append(found.values['friction_at_no_pressure'])
         each = cross_validate(LAW, readings, found.values).values
-        errors.append(jackknife_errors(table_of(each, ['friction_at_no_pressure']))[0])
+        errors.append(jackknife_errors(np.array([[one['friction_at_no_pressure']] for one in each]))[0])
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.std(estimates), rel=0.35)
 
 
@@ -151,7 +150,7 @@ def test_standard_errors_know_that_the_readings_of_a_test_are_off_together():
         readings = noted(scatter=0.01, test_scatter=0.1, seed=seed, law=constant, values={CONSTANT: 20.0})
         found = fit(constant, readings)
         each = cross_validate(constant, readings, found.values).values
-        errors.append(jackknife_errors(table_of(each, [CONSTANT]))[0] / 20.0)
+        errors.append(jackknife_errors(np.array([[one[CONSTANT]] for one in each]))[0] / 20.0)
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(0.1 / np.sqrt(3.0), rel=0.25)
 
 
