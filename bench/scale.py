@@ -91,18 +91,18 @@ def _decode(_: Path) -> Callable[[Path], object]:
 
 
 def _verify(bag: Path) -> Callable[[Path], object]:
-    from seal_friction_ros.offline.replay.compiled_replay import compile_now, first_configurations
+    from seal_friction_ros.offline.replay.compiled_replay import compile_first
     from seal_friction_ros.offline.replay.parallel_replay import verify
 
-    compile_now(first_configurations([bag], '', None))
+    compile_first([bag])
     return lambda bag: verify(bag, bulk_from=0)
 
 
 def _fleet(bag: Path) -> Callable[[Path], object]:
     from seal_friction_ros.offline.replay.bag_summary import bag_summary
-    from seal_friction_ros.offline.replay.compiled_replay import compile_now, first_configurations
+    from seal_friction_ros.offline.replay.compiled_replay import compile_first
 
-    compile_now(first_configurations([bag], '', None))
+    compile_first([bag])
     return bag_summary
 
 

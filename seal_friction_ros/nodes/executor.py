@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 import rclpy
+from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -26,11 +27,11 @@ _LONG_WAIT = 86400.0  # [s] an infinite wait overflows the clock of the events e
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
-def spin(node: Node, stopped: Future) -> None:
+def spin(node: Node, stopped: Future, context: Context | None = None) -> None:
     """Spin until ``stopped`` is done; the events executor, if available, takes a third of the processor time."""
-    executor = (EventsExecutor or SingleThreadedExecutor)()
+    executor = (EventsExecutor or SingleThreadedExecutor)(context=context)
     executor.add_node(node)
-    while rclpy.ok() and not stopped.done():
+    while rclpy.ok(context=context) and not stopped.done():
         executor.spin_until_future_complete(stopped, timeout_sec=_LONG_WAIT)
 
 
