@@ -81,11 +81,11 @@ def errors(work: Path, learnt_on: list[Path], used_on: list[Path], mass: float =
 def _near_reversals(bag: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Error of the friction force near the reversals [N], whether the status is 0, and whether the band holds it."""
     messages = list(read_messages(bag))
-    estimates = np.array([decode(ESTIMATE_TYPE, m.data)[:13] for m in messages if m.type_name == ESTIMATE_TYPE], float)
+    estimates = np.array([decode(ESTIMATE_TYPE, m.data)[:14] for m in messages if m.type_name == ESTIMATE_TYPE], float)
     velocities = [decode(VELOCITY_TYPE, m.data)[:2] for m in messages if m.type_name == VELOCITY_TYPE]
     stamp, velocity = np.array(velocities, float).T
     way = np.abs(velocity) * np.diff(stamp, prepend=stamp[0]) * 1e-9
-    std, state, direction, status, offset, residual = estimates[:, [2, 5, 6, 7, 11, 12]].T
+    std, state, direction, status, offset, residual = estimates[:, [13, 5, 6, 7, 11, 12]].T
     travel, last, since = np.zeros(len(way)), 0.0, 0.0
     slides = state == FrictionState.SLIDING
     for i in np.flatnonzero(slides):

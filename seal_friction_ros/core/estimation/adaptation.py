@@ -68,6 +68,9 @@ WAVERING = 0.25  # [-] of the friction: root mean square of a drift that nothing
 LASTING_DRIFT = 0.4  # [-] and that drift just now,
 UNPROVEN_DRIFT = 0.2  # [-] or this before the motion has told the friction
 FEWEST_SAMPLES = 4  # in each of two strokes that are compared
+FEWEST_OF_STROKE = 10  # samples in a stroke whose work is a reading
+SHORTEST_WAY = 2e-3  # [m] of such a stroke: a shorter one may be hum of the sensor
+UNKNOWN_DELAY = 5e-3  # [s] standard deviation of the time by which force sum and velocity may be apart
 LONGEST_PAUSE = 60.0  # [s] between them
 
 
@@ -149,6 +152,21 @@ class Rest(NamedTuple):
 
 NO_REST = Rest()
 
+
+class Work(NamedTuple):
+    """The present stroke from where the rod turned, by signals after two lags."""
+
+    way: float  # [m] with its sign
+    force: float  # [J] of the force sum
+    friction: float  # [J] of the friction of the law
+    square: float  # [m^2/s] of the velocity, over the time
+    delayed: float  # [W] work that the force sum does more if it comes a second later
+    samples: int
+    is_good: bool  # whether every sample was usable, identified, and none was a reading of its own
+
+
+NO_WORK = Work(0.0, 0.0, 0.0, 0.0, 0.0, 0, True)
+
 ANY = 1e300  # [N] innovation that nothing is beyond, before the first reading
 
 
@@ -187,6 +205,7 @@ class AdaptationState(NamedTuple):
     strokes: Strokes
     rest: Rest
     outlook: Outlook
+    work: Work
 
 
 NO_SIGNALS = Lagging(0.0, 0.0, 0.0)
@@ -203,6 +222,7 @@ NOT_ADAPTED = AdaptationState(
     strokes=Strokes(),
     rest=NO_REST,
     outlook=NO_OUTLOOK,
+    work=NO_WORK,
 )
 """State before the first sample."""
 
@@ -271,18 +291,78 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
         most = JUMPED if slide.is_identified and not strokes.present.is_identified else math.inf
         if most * friction >= twice.friction * direction >= SETTLED * friction >= LEAST_FRICTION:
             force, law = twice.force_sum - settings.moving_mass * acceleration, twice.friction * direction
-            reading = Reading(slide.stamp, force, direction, twice.velocity, way, law, slide.friction_std, rest.loaded)
+            reading = Reading(
+                slide.stamp, force, direction, twice.velocity, way, law, slide.friction_std, rest.loaded, 0.0
+            )
             strokes = _with_reading(strokes, reading, slide.is_identified)
             if is_outlier:
                 known = disregarded(known, reading, elapsed)
             elif slide.is_identified:
                 known, way = updated(known, reading), 0.0
                 rest = replace(rest, loaded=0.0) if fastest >= slide.slow else rest
+    work, turned = _worked(state, twice, elapsed, slide.is_usable and slide.is_identified and not is_even)
+    if turned and _is_reading(state.work, slide):
+        reading = _reading_of_work(state.work, slide, way)
+        fastest = abs(reading.velocity) if abs(reading.velocity) > fastest else fastest
+        known, way, rest = updated(known, reading), way - reading.way, replace(rest, loaded=0.0)
     outlook = outlook_of(settings, known, way, bias, acceleration, may_rest)
     by_motion = known if fastest >= slide.slow else by_motion
     return AdaptationState(
-        slide.stamp, once, twice, acceleration, way, fastest, bias, known, by_motion, strokes, rest, outlook
+        slide.stamp, once, twice, acceleration, way, fastest, bias, known, by_motion, strokes, rest, outlook, work
     )
+
+
+@compilable
+def _worked(state: AdaptationState, twice: Lagging, elapsed: float, is_good: bool) -> tuple[Work, bool]:
+    """Work of the stroke after one more sample, and whether the rod has turned, so that it is that of a new one."""
+    before, work = state.twice, state.work
+    velocity = 0.5 * (before.velocity + twice.velocity)
+    turned = before.velocity * twice.velocity <= 0.0
+    if turned:
+        work = NO_WORK
+    return (
+        Work(
+            work.way + velocity * elapsed,
+            work.force + 0.5 * (before.force_sum + twice.force_sum) * velocity * elapsed,
+            work.friction + 0.5 * (before.friction + twice.friction) * velocity * elapsed,
+            work.square + velocity * velocity * elapsed,
+            work.delayed + (before.force_sum - twice.force_sum) * velocity,
+            work.samples + 1,
+            work.is_good and is_good,
+        ),
+        turned,
+    )
+
+
+@compilable
+def _is_reading(work: Work, slide: Slide) -> bool:
+    """Whether the work of a whole stroke is a reading: long, of a rod that slid, and without readings of its own."""
+    way = abs(work.way)
+    if not work.is_good or work.samples < FEWEST_OF_STROKE or way < SHORTEST_WAY:
+        return False
+    return work.square > slide.slow * way and work.friction > LEAST_FRICTION * way
+
+
+@compilable
+def _reading_of_work(work: Work, slide: Slide, way: float) -> Reading:
+    r"""Reading by the work of a stroke between two turns, at which the rod has no speed: inertia takes no part in it.
+
+    .. math:: y = \frac{\int \Sigma F\,v\,dt}{\Delta x}, \quad f = \frac{\int f\,|v|\,dt}{|\Delta x|}, \quad
+              v = \frac{\int v^2\,dt}{\Delta x}
+
+    A force sum that comes later than the velocity does the work of inertia, too: the reading is uncertain by what
+    `UNKNOWN_DELAY` makes of it. It is that of the middle of the stroke.
+
+    Args:
+        work: Of the stroke.
+        slide: The sample after the turn.
+        way: Of the rod since the last reading [m].
+    """
+    return Reading(
+        slide.stamp, work.force / work.way, 1 if work.way > 0.0 else -1, work.square / work.way,
+        way - 0.5 * work.way, work.friction / abs(work.way), slide.friction_std, 0.0,
+        UNKNOWN_DELAY * abs(work.delayed / work.way),
+    )  # fmt: skip
 
 
 @compilable
@@ -292,7 +372,7 @@ def _interrupted(settings: AdaptationSettings, state: AdaptationState, stamp: in
     strokes = Strokes(NO_STROKE, NO_STROKE, state.strokes.ratio, state.strokes.reversals)
     outlook = outlook_of(settings, known, way, 0.0, 0.0, False)
     return AdaptationState(
-        stamp, newest, newest, 0.0, way, state.fastest, 0.0, known, state.by_motion, strokes, rest, outlook
+        stamp, newest, newest, 0.0, way, state.fastest, 0.0, known, state.by_motion, strokes, rest, outlook, NO_WORK
     )
 
 

@@ -43,6 +43,7 @@ from seal_friction_ros.core.estimation.sheared_seals import (
 )
 from seal_friction_ros.core.estimation.swings import LONGEST_SWING, NO_SWING, Swing, swing_on
 from seal_friction_ros.core.foundation.compiled import compilable, replace
+from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.parameters import check, parameter
 from seal_friction_ros.core.friction.actuator import (
     ActuatorFriction,
@@ -345,6 +346,7 @@ _UNKNOWN = StateFriction(UNKNOWN, 0, 0.0)
 ZERO_MAX = 5.0  # [-] our choice: zero of a velocity sensor over stick_velocity; a slower rod may be at rest
 CREEP = 0.1  # [-] our choice: a rod that moves against its force sum slides from this share of stick_velocity on
 SETTLING_TIME = 0.01  # [s] our choice: in this time the way of a sliding rod exceeds the ripple of its signal clearly
+SHEARED = 5e-4  # [m] our choice: way from a turn after which every seal slides
 SHORTEST_INTERVAL = 1e-3  # [s] our choice: over less, noise exceeds any rate, and some drivers stamp no finer
 
 
@@ -400,7 +402,8 @@ def estimate_at(
     if parameters.has_temperature_scale:
         seen, friction = _at_seal_temperature(parameters, seen, friction, sample.temperature)
     if parameters.adapts:
-        adapted, estimate = _estimate_with_learnt(parameters, state.adaptation, seen, friction)
+        has_turned = velocity * state.swing.way <= 0.0 or abs(state.swing.way) < SHEARED
+        adapted, estimate = _estimate_with_learnt(parameters, state.adaptation, seen, friction, has_turned)
     else:
         std = friction.coulomb_friction_std
         adapted, estimate = friction, estimate_of(parameters, seen, friction, std, 1.0, 0.0, 0.0, 0.0)
@@ -478,9 +481,13 @@ def _at_seal_temperature(
 
 @compilable
 def _estimate_with_learnt(
-    parameters: Any, known: AdaptationState, seen: Observation, friction: ActuatorFriction
+    parameters: Any, known: AdaptationState, seen: Observation, friction: ActuatorFriction, has_turned: bool
 ) -> tuple[ActuatorFriction, FrictionEstimate]:
-    """Friction and estimate by what was learnt before this sample."""
+    """Friction and estimate by what was learnt before this sample.
+
+    Just after a rod ``has_turned``, its seals may shear still, or its velocity be early: where the force sum does not
+    show the friction, the band of the friction that acts holds both directions.
+    """
     settings, uses, outlook, velocity = parameters.adaptation, parameters.uses_scale, known.outlook, seen.velocity
     status, force_sum, left = seen.status | outlook.status, seen.force_sum, 0.0
     law = friction.coulomb_friction + friction.velocity_friction
@@ -496,6 +503,8 @@ def _estimate_with_learnt(
             contradicts = contradicts or abs(left - found) > outlook.most
             sliding = adapted.coulomb_friction + adapted.velocity_friction
             left -= sliding if velocity > 0.0 else -sliding
+            if has_turned and abs(left) > BAND_95 * std:
+                std = 2.0 * sliding / BAND_95
     if contradicts:
         status |= BITS.MODEL_DISAGREES
     if status != seen.status or force_sum != seen.force_sum:

@@ -201,6 +201,7 @@ class Reading(NamedTuple):
     friction: float  # [N] f of the law, > 0
     friction_std: float  # [N] of a new reading, by the seal file
     loaded: float = 0.0  # [N] sudden change of the force sum in the rest before: it may be a load
+    std: float = 0.0  # [N] standard deviation of what this reading alone may be off by
 
 
 @compilable
@@ -328,6 +329,7 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
     innovation = reading.force - expected(terms, reading)
     usual = known.unexplained.usual
     noise = known.unexplained.noise * (reading.friction if reading.friction > usual else usual)
+    noise = math.sqrt(noise * noise + reading.std * reading.std) if reading.std > 0.0 else noise
     gains = _gains(covariance, reading)
     spread = expected(gains, reading)
     variance = spread + noise * noise
