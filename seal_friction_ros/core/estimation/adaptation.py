@@ -299,12 +299,16 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
                 known = disregarded(known, reading, elapsed)
             elif slide.is_identified:
                 known, way = updated(known, reading), 0.0
-                rest = replace(rest, loaded=0.0) if fastest >= slide.slow else rest
-    work, turned = _worked(state, twice, elapsed, slide.is_usable and slide.is_identified and not is_even)
-    if turned and _is_reading(state.work, slide):
-        reading = _reading_of_work(state.work, slide, way)
+                if rest.loaded != 0.0 and fastest >= slide.slow:
+                    rest = replace(rest, loaded=0.0)
+    is_good = slide.is_usable and slide.is_identified and not is_even
+    work = _worked(state, twice, elapsed, is_good)
+    if work.samples == 1 and _is_reading(state.work, slide):  # the rod has turned
+        reading = _reading_of_work(state.work, slide, way, rest.loaded)
+        known, way = updated(known, reading), way - reading.way
         fastest = abs(reading.velocity) if abs(reading.velocity) > fastest else fastest
-        known, way, rest = updated(known, reading), way - reading.way, replace(rest, loaded=0.0)
+        if rest.loaded != 0.0:
+            rest = replace(rest, loaded=0.0)
     outlook = outlook_of(settings, known, way, bias, acceleration, may_rest)
     by_motion = known if fastest >= slide.slow else by_motion
     return AdaptationState(
@@ -313,25 +317,18 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
 
 
 @compilable
-def _worked(state: AdaptationState, twice: Lagging, elapsed: float, is_good: bool) -> tuple[Work, bool]:
-    """Work of the stroke after one more sample, and whether the rod has turned, so that it is that of a new one."""
+def _worked(state: AdaptationState, twice: Lagging, elapsed: float, is_good: bool) -> Work:
+    """Work of the stroke after one more sample: of a new stroke if the rod has turned."""
     before, work = state.twice, state.work
-    velocity = 0.5 * (before.velocity + twice.velocity)
-    turned = before.velocity * twice.velocity <= 0.0
-    if turned:
+    if before.velocity * twice.velocity <= 0.0:
         work = NO_WORK
-    return (
-        Work(
-            work.way + velocity * elapsed,
-            work.force + 0.5 * (before.force_sum + twice.force_sum) * velocity * elapsed,
-            work.friction + 0.5 * (before.friction + twice.friction) * velocity * elapsed,
-            work.square + velocity * velocity * elapsed,
-            work.delayed + (before.force_sum - twice.force_sum) * velocity,
-            work.samples + 1,
-            work.is_good and is_good,
-        ),
-        turned,
-    )
+    velocity = 0.5 * (before.velocity + twice.velocity)
+    way = velocity * elapsed
+    return Work(
+        work.way + way, work.force + 0.5 * (before.force_sum + twice.force_sum) * way,
+        work.friction + 0.5 * (before.friction + twice.friction) * way, work.square + velocity * way,
+        work.delayed + (before.force_sum - twice.force_sum) * velocity, work.samples + 1, work.is_good and is_good,
+    )  # fmt: skip
 
 
 @compilable
@@ -344,7 +341,7 @@ def _is_reading(work: Work, slide: Slide) -> bool:
 
 
 @compilable
-def _reading_of_work(work: Work, slide: Slide, way: float) -> Reading:
+def _reading_of_work(work: Work, slide: Slide, way: float, loaded: float) -> Reading:
     r"""Reading by the work of a stroke between two turns, at which the rod has no speed: inertia takes no part in it.
 
     .. math:: y = \frac{\int \Sigma F\,v\,dt}{\Delta x}, \quad f = \frac{\int f\,|v|\,dt}{|\Delta x|}, \quad
@@ -357,10 +354,11 @@ def _reading_of_work(work: Work, slide: Slide, way: float) -> Reading:
         work: Of the stroke.
         slide: The sample after the turn.
         way: Of the rod since the last reading [m].
+        loaded: Sudden change of the force sum in the rest before [N].
     """
     return Reading(
         slide.stamp, work.force / work.way, 1 if work.way > 0.0 else -1, work.square / work.way,
-        way - 0.5 * work.way, work.friction / abs(work.way), slide.friction_std, 0.0,
+        way - 0.5 * work.way, work.friction / abs(work.way), slide.friction_std, loaded,
         UNKNOWN_DELAY * abs(work.delayed / work.way),
     )  # fmt: skip
 
@@ -393,7 +391,7 @@ def _rested(settings: AdaptationSettings, state: AdaptationState, slide: Slide, 
     held = before.held * (1.0 - elapsed / USUAL_TIME)
     if direction != 0:
         loaded = before.loaded * (1.0 - elapsed / LOADED_TIME)
-        return replace(NO_REST, slid=slide.stamp, ripple=ripple, loaded=loaded, held=held)
+        return Rest(slide.stamp, ripple, 0.0, 0.0, NEVER, loaded, held)
     beyond = abs(slide.force_sum - outlook.offset) - outlook.scale * slide.friction
     most = (settings.scale_max - outlook.scale) * slide.friction
     if slide.is_usable and outlook.is_proven and beyond > held and (slide.stamp - before.slid) * 1e-9 >= REST:
@@ -546,25 +544,29 @@ def friction_of_sliding(
         Friction of the estimate; friction by the filter with the sign of the velocity, without bounds [N].
     """
     coulomb, file_std, added = friction.coulomb_friction, friction.coulomb_friction_std, friction.velocity_friction
-    stiction, asymmetry, is_in_range = friction.stiction, friction.breakaway_asymmetry, friction.in_identified_range
-    law, known, terms, is_proven = coulomb + added, state.filter, state.filter.terms, state.outlook.is_proven
-    lowest, highest = settings.scale_min, settings.scale_max
+    law, known, is_proven = coulomb + added, state.filter, state.outlook.is_proven
+    terms, lowest, highest = known.terms, settings.scale_min, settings.scale_max
     direction, speed = (1.0, velocity) if velocity > 0.0 else (-1.0, -velocity)
-    slope = terms.scale + direction * terms.asymmetry
-    found = slope * law + terms.coulomb + terms.misfit + terms.viscous * speed
+    slope, constant, misfit = terms.scale + direction * terms.asymmetry, terms.coulomb, terms.misfit
+    found = slope * law + constant + misfit + terms.viscous * speed
     found = found if found > 0.0 else 0.0
     sliding = found if lowest * law <= found <= highest * law else between(lowest * law, found, highest * law)
     std = _std_of_sliding(state, speed, law, file_std)
     if uses and is_proven:
-        at_no_speed = between(lowest * coulomb, slope * coulomb + terms.coulomb + terms.misfit, highest * coulomb)
+        at_no_speed = slope * coulomb + constant + misfit
+        if not lowest * coulomb <= at_no_speed <= highest * coulomb:
+            at_no_speed = between(lowest * coulomb, at_no_speed, highest * coulomb)
         scale = sliding / law if law > 0.0 else 1.0
+        stiction, asymmetry = friction.stiction * scale, friction.breakaway_asymmetry * scale
         adapted = ActuatorFriction(
-            at_no_speed, std, stiction * scale, is_in_range, sliding - at_no_speed, asymmetry * scale
+            at_no_speed, std, stiction, friction.in_identified_range, sliding - at_no_speed, asymmetry
         )
         return adapted, direction * found, law > 0.0 and sliding != found
     missed, doubt = found - law, file_std * file_std + known.friction_std * known.friction_std
     std = _about(abs(sliding - law), std)
-    adapted = ActuatorFriction(coulomb, std, stiction, is_in_range, added, asymmetry)
+    adapted = ActuatorFriction(
+        coulomb, std, friction.stiction, friction.in_identified_range, added, friction.breakaway_asymmetry
+    )
     return adapted, direction * found, is_proven and law > 0.0 and missed * missed > 4.0 * doubt
 
 
@@ -651,12 +653,16 @@ def _std_of_sliding(state: AdaptationState, speed: float, law: float, file_std: 
     if known.stamp == NEVER:
         return math.sqrt(NEW_RUN * law * NEW_RUN * law + file_std * file_std)
     slow, held = STRIBECK * law, state.rest.held / BAND_95
-    faster = speed / STRIBECK_SPEED * (speed / STRIBECK_SPEED)
+    faster, last, std = speed / STRIBECK_SPEED, known.friction, known.friction_std
+    faster *= faster
     stribeck = (held if held > slow else slow) / (1.0 + faster * faster)
-    untold = known.terms.viscous * (speed - state.fastest) if speed > state.fastest else 0.0
-    std = known.friction_std * (law / known.friction if law > known.friction else 1.0)
-    least = LEAST_STD * law
-    std = math.sqrt(std * std + stribeck * stribeck + untold * untold + state.outlook.unexplained_square)
+    if law > last:
+        std *= law / last
+    variance = std * std + stribeck * stribeck
+    if speed > state.fastest:
+        untold = known.terms.viscous * (speed - state.fastest)
+        variance += untold * untold
+    least, std = LEAST_STD * law, math.sqrt(variance + state.outlook.unexplained_square)
     return std if std > least else least
 
 

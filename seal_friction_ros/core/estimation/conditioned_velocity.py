@@ -100,11 +100,11 @@ def condition_velocity(
     if turns and abs(state.way) < SHORT_WAY * half_width and half_width < WIDEST * max(ripple, resolution * step):
         half_width = 1.5 * half_width
     result = _speed(state, stamp, push, half_width, smoothing, step)
+    is_waiting = push == 0.0 and (result != last or state.half_width == 0.0)
+    last_push, way = stamp if push != 0.0 else state.last_push, push if turns else state.way + push
     return ConditionedVelocity(
-        stamp=stamp, velocity=result, half_width=half_width, ripple=half_width / step, smoothing=smoothing,
-        is_waiting=push == 0.0 and (result != last or state.half_width == 0.0), last_velocity=velocity,
-        last_change=change, last_ripple=ripple, slack=slack - push,
-        last_push=stamp if push != 0.0 else state.last_push, way=push if turns else state.way + push, samples=samples,
+        stamp, result, half_width, half_width / step, smoothing, is_waiting, velocity, change, ripple, slack - push,
+        last_push, way, samples,
     )  # fmt: skip
 
 
@@ -139,11 +139,22 @@ def _speed(
 @compilable
 def _clean(stamp: int, velocity: float, change: float, ripple: float, samples: int) -> ConditionedVelocity:
     """A sample of a signal without ripple: the velocity as it is."""
+    half_width = given_ripple = smoothing = slack = way = 0.0
     return ConditionedVelocity(
-        stamp=stamp, velocity=velocity, half_width=0.0, ripple=0.0, smoothing=0.0, is_waiting=False,
-        last_velocity=velocity, last_change=change, last_ripple=ripple, slack=0.0, last_push=stamp, way=0.0,
-        samples=samples,
-    )  # fmt: skip
+        stamp,
+        velocity,
+        half_width,
+        given_ripple,
+        smoothing,
+        False,
+        velocity,
+        change,
+        ripple,
+        slack,
+        stamp,
+        way,
+        samples,
+    )
 
 
 @compilable

@@ -65,6 +65,7 @@ from seal_friction_ros.core.friction.identified_motion import ANY_MOTION, Motion
 from seal_friction_ros.core.friction.presliding import PreslidingNumbers, presliding_numbers
 from seal_friction_ros.core.friction.states import (
     BREAKAWAY,
+    SLIDING,
     UNKNOWN,
     StateFriction,
     is_at_rest,
@@ -441,11 +442,11 @@ def learn_from(
     if not parameters.adapts or not is_due(known, seen.stamp):
         return known
     status = estimate.status & ~BITS.MODEL_DISAGREES
+    law, slow = friction.coulomb_friction + friction.velocity_friction, ZERO_MAX * parameters.settings.stick_velocity
+    is_pressed, is_usable = estimate.state == BREAKAWAY, not status & ~_EXTRAPOLATED
     slide = Slide(
-        stamp=seen.stamp, velocity=seen.velocity, force_sum=seen.force_sum,
-        friction=friction.coulomb_friction + friction.velocity_friction, friction_std=friction.coulomb_friction_std,
-        is_pressed=estimate.state == BREAKAWAY, is_usable=not status & ~_EXTRAPOLATED, is_identified=status == 0,
-        slow=ZERO_MAX * parameters.settings.stick_velocity,
+        seen.stamp, seen.velocity, seen.force_sum, law, friction.coulomb_friction_std, is_pressed, is_usable,
+        status == 0, slow,
     )  # fmt: skip
     return adapt(parameters.adaptation, known, slide)
 
@@ -488,11 +489,11 @@ def _estimate_with_learnt(
     Just after a rod ``has_turned``, its seals may shear still, or its velocity be early: where the force sum does not
     show the friction, the band of the friction that acts holds both directions.
     """
-    settings, uses, outlook, velocity = parameters.adaptation, parameters.uses_scale, known.outlook, seen.velocity
-    status, force_sum, left = seen.status | outlook.status, seen.force_sum, 0.0
-    law = friction.coulomb_friction + friction.velocity_friction
+    settings, uses, outlook = parameters.adaptation, parameters.uses_scale, known.outlook
+    stamp, velocity, force_sum, seen_status, input_age = seen
+    status, left = seen_status | outlook.status, 0.0
     if velocity == 0.0:
-        adapted, std, contradicts = friction_at_rest(settings, known, friction, seen.stamp, force_sum, uses)
+        adapted, std, contradicts = friction_at_rest(settings, known, friction, stamp, force_sum, uses)
         if uses and outlook.is_proven:
             force_sum -= outlook.offset
     else:
@@ -507,10 +508,11 @@ def _estimate_with_learnt(
                 std = 2.0 * sliding / BAND_95
     if contradicts:
         status |= BITS.MODEL_DISAGREES
-    if status != seen.status or force_sum != seen.force_sum:
-        seen = Observation(seen.stamp, velocity, force_sum, status, seen.input_age)
+    if status != seen_status or force_sum != seen.force_sum:
+        seen = Observation(stamp, velocity, force_sum, status, input_age)
     scale_std = outlook.scale_std
     if scale_std < 0.0:
+        law = friction.coulomb_friction + friction.velocity_friction
         scale_std = friction.coulomb_friction_std / law if law > 0.0 else 0.0
     return adapted, estimate_of(parameters, seen, adapted, std, outlook.scale, scale_std, outlook.unsteady_offset, left)
 
@@ -698,25 +700,26 @@ def estimate_of(
     ``std`` [N] is that of the friction that acts; ``scale``, ``scale_std``, ``offset`` and ``residual`` [N] are what
     adaptation adds to the estimate.
     """
-    velocity, status, coulomb = seen.velocity, seen.status, friction.coulomb_friction
-    ahead = sign(velocity if velocity != 0.0 else seen.force_sum)
-    breakaway = breakaway_in(friction, ahead, with_stiction=parameters.settings.use_stiction)
+    stamp, velocity, force_sum, status, input_age = seen
+    ahead, coulomb = sign(velocity if velocity != 0.0 else force_sum), friction.coulomb_friction
+    breakaway = breakaway_in(friction, ahead, parameters.settings.use_stiction)
     if not friction.in_identified_range:
         status |= BITS.OUTSIDE_IDENTIFIED_RANGE
     if parameters.limits_motion:
         status |= _unidentified_motion(parameters.motion_limits, velocity)
-    acting, slides = _UNKNOWN, velocity != 0.0
+    slides, sliding = velocity != 0.0, coulomb + friction.velocity_friction
     if not slides and parameters.force_sum_correction.contains_load:
         status |= BITS.FORCE_CONTAINS_LOAD
-    if not status & _NO_STATE and (slides or not status & _NO_FORCE_SUM):
-        sliding = coulomb + friction.velocity_friction
-        acting = state_friction(velocity, seen.force_sum, not slides, sliding, breakaway)
-    return FrictionEstimate(
-        stamp=seen.stamp, coulomb_friction=coulomb, coulomb_friction_std=friction.coulomb_friction_std,
-        breakaway_force=breakaway, friction_force=acting.friction_force, state=acting.state,
-        direction=acting.direction, status=status, input_age=seen.input_age, adaptation_scale=scale,
-        adaptation_scale_std=scale_std, adaptation_offset=offset, residual=residual,
-        friction_force_std=std if acting.state != UNKNOWN else -1.0,
+    state, direction, force = _UNKNOWN
+    if not status & _NO_STATE:
+        if slides:  # `state_friction`, without its record
+            state, direction, force = SLIDING, ahead, sliding * ahead
+        elif not status & _NO_FORCE_SUM:
+            state, direction, force = state_friction(velocity, force_sum, True, sliding, breakaway)
+    std = std if state != UNKNOWN else -1.0
+    return FrictionEstimate(  # by position, as every record of each sample: names take twice the time
+        stamp, coulomb, friction.coulomb_friction_std, breakaway, force, state, direction, status, input_age, scale,
+        scale_std, offset, residual, std,
     )  # fmt: skip
 
 

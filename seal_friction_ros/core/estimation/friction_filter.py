@@ -435,38 +435,36 @@ def _outliers(
     known: FrictionFilter, direction: int, terms: Terms, innovation: float, variance: float
 ) -> tuple[Outliers, bool]:
     """Outliers after an innovation [N], and whether they are a step of the load, or of the friction."""
-    before, turns = known.outliers, direction != known.direction
-    side = 0
+    number, last, second, settled, is_stepped = known.outliers
+    turns, side = direction != known.direction, 0
     if innovation * innovation > OUTLIER * OUTLIER * variance:
         side = 1 if innovation > 0.0 else -1
-    goes_on = before.number * side > 0
-    leap = innovation if turns else innovation - before.second
+    goes_on = number * side > 0
+    leap = innovation if turns else innovation - second
     if not goes_on and leap * leap < LEAP * LEAP * variance:
         side = 0
-    count = before.number + side if goes_on else side
-    steps = abs(count) >= STEP_READINGS or (turns and abs(before.number) >= FEWEST_OUTLIERS)
-    settled = before.settled if before.number != 0 else terms
-    second = innovation if turns else before.last
-    return Outliers(0 if steps else count, innovation, second, settled, before.is_stepped or steps), steps
+    count = number + side if goes_on else side
+    steps = abs(count) >= STEP_READINGS or (turns and abs(number) >= FEWEST_OUTLIERS)
+    settled, second = settled if number != 0 else terms, innovation if turns else last
+    return Outliers(0 if steps else count, innovation, second, settled, is_stepped or steps), steps
 
 
 @compilable
 def _followed(known: FrictionFilter, friction: float, unexplained: float, excess: float, moved: float) -> Unexplained:
     """What is not explained after ``unexplained`` [N] more; ``excess`` is the squared innovation over its variance."""
-    before = known.unexplained
+    noise, usual, drift, drift_square, square = known.unexplained
     excess = excess if excess < OUTLIER * OUTLIER else OUTLIER * OUTLIER
-    variance = before.noise * before.noise * (1.0 + moved / (moved + NOISE_TIME) * (excess - 1.0))
-    noise = between(LEAST_NOISE, math.sqrt(variance), 1.0)
+    variance = noise * noise * (1.0 + moved / (moved + NOISE_TIME) * (excess - 1.0))
     if known.direction == 0:
         unexplained = 0.0  # all of it may be offset
-    drift = before.drift + moved / (moved + DRIFT_TIME) * (unexplained - before.drift)
+    drift += moved / (moved + DRIFT_TIME) * (unexplained - drift)
     share = moved / (moved + DRIFT_MEMORY)
     return Unexplained(
-        noise,
-        before.usual + moved / (moved + USUAL_TIME) * (friction - before.usual),
+        between(LEAST_NOISE, math.sqrt(variance), 1.0),
+        usual + moved / (moved + USUAL_TIME) * (friction - usual),
         drift,
-        before.drift_square + share * (drift * drift - before.drift_square),
-        before.square + share * (unexplained * unexplained - before.square),
+        drift_square + share * (drift * drift - drift_square),
+        square + share * (unexplained * unexplained - square),
     )
 
 

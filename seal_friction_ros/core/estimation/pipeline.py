@@ -247,11 +247,11 @@ def receive_velocity(parameters: Any, state: Any, velocity: Any, received: int, 
     settings, stamp, made = parameters.feedforward, velocity.stamp, state.feedforward.received
     running, receipt = state.estimator, state.receipt
     is_new = running.stamp != stamp
+    stamp_age = (received + state.clock_offset - stamp) * 1e-9
+    is_late = since == NEVER or _stands_still(state.clock, receipt.clock, received, settings.estimate_timeout)
     sample = RodSample(
-        stamp=stamp, velocity=velocity.velocity, pressure=state.pressure, force=state.force, refused=state.refused,
-        stamp_age=(received + state.clock_offset - stamp) * 1e-9, temperature=state.temperature,
-        is_late=since == NEVER or _stands_still(state.clock, receipt.clock, received, settings.estimate_timeout),
-    )  # fmt: skip
+        stamp, velocity.velocity, state.pressure, state.force, state.refused, stamp_age, state.temperature, is_late
+    )
     estimate, seen, friction = estimate_at(parameters.estimator, running, sample)
     send(emit, estimate, velocity.frame_id)
     running.adaptation = learn_from(parameters.estimator, running.adaptation, estimate, seen, friction)

@@ -226,10 +226,10 @@ def slide_on(
         return False, state
     if excess != seals.excess:
         seals = Shear(NO_ELEMENTS, excess)
+    full, way_back = direction * sliding, direction * way_left
     return True, FollowedShear(
-        stamp=stamp, velocity=velocity, elapsed=elapsed, seals=seals, softer=seals, is_known=True, direction=direction,
-        rest_since=rest_since, fully_sheared=direction * sliding, way_back=direction * way_left, rests_alike=True,
-    )  # fmt: skip
+        stamp, velocity, elapsed, seals, seals, True, direction, rest_since, full, way_back, True
+    )
 
 
 @compilable

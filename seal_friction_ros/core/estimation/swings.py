@@ -57,10 +57,9 @@ def swing_on(swing: Swing, elapsed: float, velocity: float, force_sum: float, fr
         swing = _turned(swing)
     step = velocity * (elapsed if 0.0 < elapsed < LONGEST_STEP else LONGEST_STEP)
     way = swing.way + step
-    return Swing(
-        way=way, work=swing.work + force_sum * step, heat=swing.heat + friction * step, last_force=swing.last_force,
-        last_friction=swing.last_friction, doubted=0.0 if abs(way) > MUCH_LONGER * swing.doubted else swing.doubted,
-    )  # fmt: skip
+    work, heat = swing.work + force_sum * step, swing.heat + friction * step
+    doubted = 0.0 if abs(way) > MUCH_LONGER * swing.doubted else swing.doubted
+    return Swing(way, work, heat, swing.last_force, swing.last_friction, doubted)
 
 
 @compilable
