@@ -1,9 +1,9 @@
 r"""What the motion teaches about the friction: signals made ready for the filter, and what its innovations say.
 
-While the rod slides evenly, the force sum less inertia is a reading for the `friction_filter`. Force sum, friction of
-the law and velocity go through **the same two lags**, of which the acceleration is taken: so inertia and friction are
-compared at one and the same time, also while the rod accelerates. Nothing is learnt at rest, with a bad input, or while
-the rod accelerates.
+While the rod slides evenly, the force sum less inertia is a reading for the `friction_filter`. A stroke that is hardly
+even is one, too, by its work: from a turn or a rest to the next one inertia does none. Force sum, friction of the law
+and velocity go through **the same two lags**, of which the acceleration is taken: so inertia and friction are compared
+at one and the same time, also while the rod accelerates. Nothing is learnt at rest or with a bad input.
 
 **Consistency.** Each sample of a sliding rod is compared with what the filter expects. An innovation of more than
 `IMPLAUSIBLE` standard deviations, or a mean over `SHORT_TIME` of more than `LASTING`, is not explained by anything that
@@ -69,6 +69,7 @@ LASTING_DRIFT = 0.4  # [-] and that drift just now,
 UNPROVEN_DRIFT = 0.2  # [-] or this before the motion has told the friction
 FEWEST_SAMPLES = 4  # in each of two strokes that are compared
 FEWEST_OF_STROKE = 10  # samples in a stroke whose work is a reading
+EVEN = 0.25  # [-] of the samples of such a stroke that may be even: more tell as much
 SHORTEST_WAY = 2e-3  # [m] of such a stroke: a shorter one may be hum of the sensor
 UNKNOWN_DELAY = 5e-3  # [s] standard deviation of the time by which force sum and velocity may be apart
 LONGEST_PAUSE = 60.0  # [s] between them
@@ -154,7 +155,7 @@ NO_REST = Rest()
 
 
 class Work(NamedTuple):
-    """The present stroke from where the rod turned, by signals after two lags."""
+    """The present stroke from where the rod turned or rested, by signals after two lags."""
 
     way: float  # [m] with its sign
     force: float  # [J] of the force sum
@@ -162,10 +163,11 @@ class Work(NamedTuple):
     square: float  # [m^2/s] of the velocity, over the time
     delayed: float  # [W] work that the force sum does more if it comes a second later
     samples: int
-    is_good: bool  # whether every sample was usable, identified, and none was a reading of its own
+    even: int  # samples of even speed, which are readings of their own
+    is_good: bool  # whether every sample was usable and identified
 
 
-NO_WORK = Work(0.0, 0.0, 0.0, 0.0, 0.0, 0, True)
+NO_WORK = Work(0.0, 0.0, 0.0, 0.0, 0.0, 0, 0, True)
 
 ANY = 1e300  # [N] innovation that nothing is beyond, before the first reading
 
@@ -299,16 +301,15 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
                 known = disregarded(known, reading, elapsed)
             elif slide.is_identified:
                 known, way = updated(known, reading), 0.0
-                if rest.loaded != 0.0 and fastest >= slide.slow:
-                    rest = replace(rest, loaded=0.0)
-    is_good = slide.is_usable and slide.is_identified and not is_even
-    work = _worked(state, twice, elapsed, is_good)
-    if work.samples == 1 and _is_reading(state.work, slide):  # the rod has turned
+                rest = _told(rest) if fastest >= slide.slow else rest
+    has_ended = direction == 0 or state.twice.velocity * twice.velocity <= 0.0
+    if has_ended and _is_reading(state.work, slide):
         reading = _reading_of_work(state.work, slide, way, rest.loaded)
         known, way = updated(known, reading), way - reading.way
         fastest = abs(reading.velocity) if abs(reading.velocity) > fastest else fastest
-        if rest.loaded != 0.0:
-            rest = replace(rest, loaded=0.0)
+        rest = _told(rest)
+    work = NO_WORK if has_ended else state.work
+    work = _worked(work, state.twice, twice, elapsed, is_even, slide.is_usable and slide.is_identified)
     outlook = outlook_of(settings, known, way, bias, acceleration, may_rest)
     by_motion = known if fastest >= slide.slow else by_motion
     return AdaptationState(
@@ -317,32 +318,30 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
 
 
 @compilable
-def _worked(state: AdaptationState, twice: Lagging, elapsed: float, is_good: bool) -> Work:
-    """Work of the stroke after one more sample: of a new stroke if the rod has turned."""
-    before, work = state.twice, state.work
-    if before.velocity * twice.velocity <= 0.0:
-        work = NO_WORK
+def _worked(work: Work, before: Lagging, twice: Lagging, elapsed: float, is_even: bool, is_good: bool) -> Work:
+    """Work of the stroke after one more sample."""
     velocity = 0.5 * (before.velocity + twice.velocity)
     way = velocity * elapsed
     return Work(
         work.way + way, work.force + 0.5 * (before.force_sum + twice.force_sum) * way,
         work.friction + 0.5 * (before.friction + twice.friction) * way, work.square + velocity * way,
-        work.delayed + (before.force_sum - twice.force_sum) * velocity, work.samples + 1, work.is_good and is_good,
+        work.delayed + (before.force_sum - twice.force_sum) * velocity, work.samples + 1,
+        work.even + 1 if is_even else work.even, work.is_good and is_good,
     )  # fmt: skip
 
 
 @compilable
 def _is_reading(work: Work, slide: Slide) -> bool:
-    """Whether the work of a whole stroke is a reading: long, of a rod that slid, and without readings of its own."""
+    """Whether the work of a whole stroke is a reading: long, of a rod that slid, and hardly even."""
     way = abs(work.way)
-    if not work.is_good or work.samples < FEWEST_OF_STROKE or way < SHORTEST_WAY:
+    if not work.is_good or work.samples < FEWEST_OF_STROKE or way < SHORTEST_WAY or work.even > EVEN * work.samples:
         return False
     return work.square > slide.slow * way and work.friction > LEAST_FRICTION * way
 
 
 @compilable
 def _reading_of_work(work: Work, slide: Slide, way: float, loaded: float) -> Reading:
-    r"""Reading by the work of a stroke between two turns, at which the rod has no speed: inertia takes no part in it.
+    r"""Reading by the work of a stroke between turns or rests, where the rod has no speed: inertia takes no part in it.
 
     .. math:: y = \frac{\int \Sigma F\,v\,dt}{\Delta x}, \quad f = \frac{\int f\,|v|\,dt}{|\Delta x|}, \quad
               v = \frac{\int v^2\,dt}{\Delta x}
@@ -405,6 +404,12 @@ def _rested(settings: AdaptationSettings, state: AdaptationState, slide: Slide, 
     if slide.is_usable and is_larger and abs(leap) > LEAP_AT_REST * slide.friction:
         leapt, leapt_at = leap, slide.stamp
     return Rest(before.slid, ripple, pressed, leapt, leapt_at, loaded, held)
+
+
+@compilable
+def _told(rest: Rest) -> Rest:
+    """Rest whose load a reading has told."""
+    return rest if rest.loaded == 0.0 else replace(rest, loaded=0.0)
 
 
 @compilable

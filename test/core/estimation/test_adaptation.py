@@ -207,6 +207,52 @@ def test_even_strokes_teach_and_rest_bad_inputs_and_unknown_inertia_do_not():
         assert (state.strokes.present, state.strokes.before, state.strokes.reversals) == (NO_STROKE, NO_STROKE, 0), name
 
 
+NEVER_EVEN = AdaptationSettings(acceleration_max=1e-6)
+
+
+def swinging(mass, seconds=10.0, speed=0.1, period=0.8, friction=45.0, offset=12.0, late=0.0):
+    """A rod of ``mass`` [kg] on a sine, which is nowhere even; the force sum comes ``late`` [s]."""
+    rate = 2.0 * math.pi / period
+
+    def velocity(time):
+        return speed * math.cos(rate * time + 0.1)
+
+    def force(time):
+        time -= late
+        inertia = -mass * speed * rate * math.sin(rate * time + 0.1)
+        return math.copysign(friction, velocity(time)) + offset + inertia
+
+    return moving(seconds, velocity, force)
+
+
+@pytest.mark.parametrize('mass', [0.0, 20.0, 100.0])
+def test_the_work_of_a_stroke_that_is_never_even_tells_friction_and_offset_whatever_the_mass(mass):
+    """Up to an inertia of twice the friction."""
+    found = learnt(adapted(swinging(mass), NEVER_EVEN))
+    assert found.scale == pytest.approx(45.0 / 40.0, rel=0.03)
+    assert found.offset == pytest.approx(12.0, abs=2.0)
+    assert 0.0 < found.scale_std < 0.15
+
+
+def test_a_force_sum_that_may_be_late_makes_the_work_of_a_large_inertia_uncertain():
+    late = learnt(adapted(swinging(100.0, late=0.005), NEVER_EVEN))
+    assert late.scale_std > 1.15 * learnt(adapted(swinging(0.0), NEVER_EVEN)).scale_std
+    assert abs(late.scale - 45.0 / 40.0) < BAND_95 * late.scale_std
+
+
+@pytest.mark.parametrize(
+    'changes',
+    [{'is_usable': False}, {'is_identified': False}, {'slow': 0.2}],
+    ids=['bad inputs', 'not identified', 'a speed that may be the zero of the sensor'],
+)
+def test_the_work_of_a_stroke_is_no_reading_of(changes):
+    assert adapted((slide._replace(**changes) for slide in swinging(20.0)), NEVER_EVEN).filter == NOT_BEGUN
+
+
+def test_the_work_of_a_stroke_of_less_than_2_mm_is_no_reading():
+    assert adapted(swinging(20.0, speed=0.011, period=0.4), NEVER_EVEN).filter == NOT_BEGUN
+
+
 @pytest.mark.parametrize('friction', [1e-3, 1e-100, 1e-200, 5e-324])
 def test_a_law_with_hardly_any_friction_leaves_every_number_finite(friction):
     """As a power law has it at a pressure near 0."""
@@ -629,6 +675,23 @@ def test_at_rest_the_band_holds_an_offset_of_the_force_sum(push, load, mode):
         assert estimate.coulomb_friction_std <= 1.2 * breakaway
     on = estimates[-1].friction_force
     assert mode == 'observe' or on == pytest.approx(push * FRICTION, abs=0.1 * FRICTION)
+
+
+@pytest.mark.parametrize('mode', ['observe', 'on'])
+@pytest.mark.parametrize('way', [2e-5, 1e-4], ids=['stiff', 'soft'])
+def test_just_after_a_turn_the_band_holds_the_friction_of_seals_that_shear_still(way, mode):
+    """Of seals that shear over a ``way`` [m], where the seal file has rigid ones; the mass is not known."""
+    known, state, friction, since = parameters(mode), estimator.init(parameters(mode)), 0.0, []
+    for i in range(12_000):
+        velocity = 0.02 if i // 2000 % 2 == 0 else -0.02
+        friction += (FRICTION * math.copysign(1.0, velocity) - friction) * (1.0 - math.exp(-2e-5 / way))
+        stamp = START + i * SECOND // 1000
+        sample = RodSample(stamp, velocity, Pressure(stamp, 3e6, 3e6), Force(stamp, friction))
+        state, estimate = step(known, state, sample)
+        if i >= 4000 and estimate.status == 0:
+            assert abs(estimate.friction_force - friction) <= BAND_95 * estimate.friction_force_std
+            since.append((i % 2000, estimate.friction_force_std / FRICTION))
+    assert max(std for moment, std in since if moment > 25) < 0.2  # 0.5 mm later
 
 
 def test_at_rest_before_any_motion_the_deviation_is_the_breakaway_force():

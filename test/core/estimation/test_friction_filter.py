@@ -147,7 +147,7 @@ class Textbook:
         self.covariance = transition @ self.covariance @ transition.T + np.diag(added)
 
     def update(self, reading: Reading) -> None:
-        _, force, direction, velocity, way, law, _, _ = reading
+        _, force, direction, velocity, way, law, *_ = reading
         elapsed = min(max((reading.stamp - self.stamp) * 1e-9, 0.0), 3600.0)
         self.stamp = reading.stamp
         moved = min(elapsed, LONGEST_STEP)
