@@ -487,7 +487,7 @@ def _estimate_with_learnt(
     """Friction and estimate by what was learnt before this sample.
 
     Just after a rod ``has_turned``, its seals may shear still, or its velocity be early: where the force sum does not
-    show the friction, the band of the friction that acts holds both directions.
+    show the friction, the band holds both directions.
     """
     settings, uses, outlook = parameters.adaptation, parameters.uses_scale, known.outlook
     stamp, velocity, force_sum, seen_status, input_age = seen
@@ -506,6 +506,7 @@ def _estimate_with_learnt(
             left -= sliding if velocity > 0.0 else -sliding
             if has_turned and abs(left) > BAND_95 * std:
                 std = 2.0 * sliding / BAND_95
+                adapted = replace(adapted, coulomb_friction_std=std)
     if contradicts:
         status |= BITS.MODEL_DISAGREES
     if status != seen_status or force_sum != seen.force_sum:
