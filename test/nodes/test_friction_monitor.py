@@ -122,6 +122,7 @@ def test_a_machine_of_three_shows_each_actuator_and_off_takes_out_all_forces(tmp
             page.wait_for(f'byId("tabs").children.length === {len(NAMES)}')
             while page.value('label') != f'{name} (/machine_estimator)':  # a frame may replace the tabs in a click
                 page.click(f'#tabs button:nth-child({place + 1})')
+                page.wait_for('label')  # the first frame of the new stream; another click would close it
             page.wait_for('columns.measured.length > 100')
             sliding = page.value(
                 'columns.measured.filter('
