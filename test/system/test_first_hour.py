@@ -197,7 +197,8 @@ def test_a_bench_with_rod_and_piston_seals_of_different_kinds_tracks(checkout: P
         runs = ' '.join(f'build/{name}' for name, *_ in SPRINGS)
         kinds = '--seal-kind rod=b,b --seal-kind piston=difference --largest-kind-error 0.5'
         terminals.run(f'{tool} identify {runs} {kinds} --out build/seal.yaml')
-        assert 'use the seal files in this cylinder only' in terminals.said[-1]
+        assert 'cannot be divided between rod and piston' in terminals.said[-1]
+        assert 'use the seal files together' in terminals.said[-1]
         terminals.run("sed -i 's|seals: .*|seals: [seal_rod.yaml, seal_piston.yaml]|' build/robot.yaml")
         terminals.start_machine(f'{plant} {sine}')
         terminals.run_node(f'{node} {off} -p record_name:=without', SINE_SECONDS)
