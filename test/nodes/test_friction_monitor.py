@@ -113,7 +113,7 @@ def test_a_machine_of_three_shows_each_actuator_and_off_takes_out_all_forces(tmp
     domain, recording = free_domain(), {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
     scales = {f'{name}.feedforward.scale': 0.9 for name in NAMES}
     with (
-        machine(tmp_path, domain, 200.0, **recording, **scales),
+        machine(tmp_path, domain, 400.0, **recording, **scales),  # parts a sample apart: 2.7 N
         monitor(domain, '--allow-changes') as running,
         shown(running.url, 1400) as page,
     ):
@@ -122,6 +122,7 @@ def test_a_machine_of_three_shows_each_actuator_and_off_takes_out_all_forces(tmp
             page.wait_for(f'byId("tabs").children.length === {len(NAMES)}')
             while page.value('label') != f'{name} (/machine_estimator)':  # a frame may replace the tabs in a click
                 page.click(f'#tabs button:nth-child({place + 1})')
+                page.wait_for('label')  # the first frame of the new stream; another click would close it
             page.wait_for('columns.measured.length > 100')
             sliding = page.value(
                 'columns.measured.filter('

@@ -183,8 +183,10 @@ def one_line(store: ObjectStore, folder: Path) -> Iterator[Claim]:
 
 def measured_claims(folder: Path, bags: int) -> list[Claim]:
     """All claims."""
-    recordings = [recording(folder, number) for number in range(bags)]
-    recordings.append(shutil.copytree(ROOT / 'bags' / 'pull_test', folder / 'pull_test'))  # one to identify
+    rig = folder / BUCKET.rpartition('/')[2]  # `fleet` says the name of the rig without what is before it
+    rig.mkdir()
+    recordings = [recording(rig, number) for number in range(bags)]
+    recordings.append(shutil.copytree(ROOT / 'bags' / 'pull_test', rig / 'pull_test'))  # one to identify
     with object_store(folder) as store:
         for bag in recordings:
             put(store, bag, bag.name)

@@ -3,6 +3,8 @@
 The test bench runs the page `docs/first_hour.md` as it stands. The pneumatic axis has no force sensor and no velocity.
 """
 
+import re
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +19,7 @@ from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.friction.actuator import ActuatorFriction, actuator_friction
 from seal_friction_ros.core.messages.coder import decode
 from seal_friction_ros.core.messages.records import Position, ServoReference
-from seal_friction_ros.files import load_configuration, read_machine
+from seal_friction_ros.files import config_path, load_configuration, machine_configurations, read_machine, read_yaml
 from seal_friction_ros.offline.bags.bag import read_messages
 from seal_friction_ros.offline.replay.replay import replay
 
@@ -103,6 +105,19 @@ def share_left(folder: Path, terminals: Terminals) -> float:
     return compensated / without
 
 
+def test_the_mapping_file_of_the_page_finds_the_seal_file_that_identify_writes(tmp_path: Path):
+    text = PAGE.read_text()
+    (out,) = re.findall(r'seal_friction identify .* --out (\S+)', text)
+    (named,) = re.findall(r'^sed -i .*', text, re.MULTILINE)
+    seal, robot = read_yaml(config_path('seals', 'ms28775_114')), tmp_path / 'build' / 'robot.yaml'
+    robot.parent.mkdir()
+    robot.write_text(next(block.text for block in blocks_of(PAGE) if block.kind == 'robot'))
+    (tmp_path / out).write_text(yaml.safe_dump(seal | {'mounting': {'chambers': ['b', 'b', 'difference']}}))
+    subprocess.run(['bash', '-c', named], cwd=tmp_path, check=True)
+    (found,) = machine_configurations(read_machine(str(robot)), 'robot.yaml').values()
+    assert [one['name'] for one in found.seal_documents] == [seal['name']] * 3
+
+
 @pytest.mark.long
 def test_the_test_bench_tracks_after_the_first_hour(checkout: Path):
     terminals = Terminals(checkout)
@@ -145,7 +160,7 @@ def test_a_pneumatic_axis_without_force_sensor_and_velocity_tracks(checkout: Pat
         terminals.start_machine(f'{plant} {strokes} -p trapezoid.acceleration:=0.5')
         terminals.run_node(f'{node} {off} -p record_name:=strokes', 16.0)
         terminals.run(f'{tool} identify build/strokes --seal-chambers a,b --out build/seal.yaml')
-        terminals.run("sed -i 's|seals: .*|seals: [build/seal.yaml]|' build/robot.yaml")
+        terminals.run("sed -i 's|seals: .*|seals: [seal.yaml]|' build/robot.yaml")
         terminals.start_machine(plant)
         terminals.run_node(f'{node} {off} -p record_name:=without', SINE_SECONDS)
         terminals.run(f'{tool} tune --bag build/without --out build/feedforward.yaml')
@@ -182,8 +197,9 @@ def test_a_bench_with_rod_and_piston_seals_of_different_kinds_tracks(checkout: P
         runs = ' '.join(f'build/{name}' for name, *_ in SPRINGS)
         kinds = '--seal-kind rod=b,b --seal-kind piston=difference --largest-kind-error 0.5'
         terminals.run(f'{tool} identify {runs} {kinds} --out build/seal.yaml')
-        assert 'use the seal files in this cylinder only' in terminals.said[-1]
-        terminals.run("sed -i 's|seals: .*|seals: [build/seal_rod.yaml, build/seal_piston.yaml]|' build/robot.yaml")
+        assert 'cannot be divided between rod and piston' in terminals.said[-1]
+        assert 'use the seal files together' in terminals.said[-1]
+        terminals.run("sed -i 's|seals: .*|seals: [seal_rod.yaml, seal_piston.yaml]|' build/robot.yaml")
         terminals.start_machine(f'{plant} {sine}')
         terminals.run_node(f'{node} {off} -p record_name:=without', SINE_SECONDS)
         terminals.run(f'{tool} tune --bag build/without --out build/feedforward.yaml')

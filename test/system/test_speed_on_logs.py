@@ -15,7 +15,7 @@ SHARED_DATA = ROOT.parent / 'shared' / 'data'
 @pytest.mark.long
 @pytest.mark.skipif(not SHARED_DATA.is_dir(), reason='the shared data are not beside the project')
 def test_no_speed_axis_beats_none_on_every_log_of_an_o_ring(tmp_path):
-    """So the seal file of a ring has none. Measured on eight logs: worse on 56 and on 5 of 56."""
+    """So the seal file of a ring has none. On eight logs that of the film is worse in 56 of 56 pairs, a power in 11."""
     case = load_case('oring_delft')
     coarse = replace(
         case,
@@ -23,7 +23,7 @@ def test_no_speed_axis_beats_none_on_every_log_of_an_o_ring(tmp_path):
         oring=replace(case.oring, numerics=OringNumerics(lines=13)),
         map=replace(case.map, velocities=6, pressures=3),
     )
-    paths = [SHARED_DATA / 'delft' / f'O-ring257_{name}.csv' for name in ('1bar', '5bar', 'run2_3bar', 'run2_7bar')]
+    paths = sorted((SHARED_DATA / 'delft').glob('O-ring257*bar.csv'))
     found = left_out(slid_logs(paths, run_map(coarse, 1), tmp_path))
     assert (found['film'] > found['none']).all()
     assert (found['power'] > found['none']).any()

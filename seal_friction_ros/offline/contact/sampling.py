@@ -10,7 +10,7 @@ in the analysis of output from a computer code, Technometrics 21, 1979.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,7 +31,7 @@ from seal_friction_ros.offline.contact.mesh_levels import COARSER, other_lines
 from seal_friction_ros.offline.contact.oring_runs import Computed, sliding_contact
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty, check_unknown
 from seal_friction_ros.offline.work.executor import Workers, nothing
-from seal_friction_ros.offline.work.finished_parts import Kept, Part, part_key, try_parts
+from seal_friction_ros.offline.work.finished_parts import Kept, Part, content_of, part_key, try_parts
 
 _EDGE = 1e-12  # share that is left out at both ends of a distribution, where a log-normal one has no value
 MOST_SPEEDS, MOST_PRESSURES = 4, 3  # of a sample; docs/ehl.md says what it costs
@@ -105,7 +105,7 @@ def uncertain_ring(
         """The ring with these values of what is unknown."""
         varied = varied_ring(case, values)
         check_pressures(varied, pressures)
-        key = part_key('ring', [_plain(varied), pressures, type(law).__name__, asdict(law) if law else {}])
+        key = part_key('ring', content_of([varied, pressures, law]))
         return [Part(key, ('normal_force', 'friction'), partial(ring_forces, varied, pressures, law))]
 
     outcome = sampled(f'{case.name}: samples', names, drawn, parts_of, workers, work)
@@ -144,12 +144,6 @@ def _drawn(name: str, unknowns: Sequence[Unknown], samples: int, seed: int) -> t
     """Names of the unknowns, and their values."""
     check_unknown(name, unknowns)
     return tuple(unknown.name for unknown in unknowns), latin_hypercube(unknowns, samples, seed)
-
-
-def _plain(case: OringCase) -> dict[str, Any]:
-    """A case as JSON can hold it."""
-    outlines = [part.tolist() for part in case.section or () if part is not None]
-    return {**asdict(replace(case, section=None)), 'section': outlines}
 
 
 def sampled(

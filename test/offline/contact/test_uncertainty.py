@@ -97,6 +97,18 @@ def test_friction_that_is_proportional_to_an_unknown_has_its_quantiles(dry, tmp_
     assert {path: path.stat().st_mtime_ns for path in work.iterdir()} == times
 
 
+def test_samples_of_a_ring_are_kept_by_the_law_of_its_friction(ring, tmp_path, capsys):
+    kept = []
+    for coefficients in ([0.3, 0.2], [0.4, 0.3], [0.4, 0.3]):
+        document = read_yaml(Path(ring)) | {'pressures': [0.0], 'unknown': {'friction_coefficient': {'factor': 1.5}}}
+        law = {'law': 'monotone_table', 'normal_forces': [10.0, 100.0], 'coefficients': coefficients}
+        document['friction']['friction_coefficient'] = law
+        Path(ring).write_text(yaml.safe_dump(document))
+        answer(capsys, 'oring', ring, '--uncertain', '2', '--workers', '1', '--work', str(tmp_path / 'work'))
+        kept.append(len(list((tmp_path / 'work').iterdir())))
+    assert kept == [kept[0], 2 * kept[0], 2 * kept[0]]
+
+
 @pytest.mark.long
 def test_one_and_two_workers_print_the_same_bytes(ring, tmp_path, capsys):
     said = []
