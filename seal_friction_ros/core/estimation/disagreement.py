@@ -22,7 +22,7 @@ PRESSURE_UNITS = {name: UNITS[name] for name in ('psi', 'bar', 'kPa', 'MPa')}  #
 IMPLAUSIBLE = 0.01  # [-] of the highest identified pressure, below which a unit may be wrong
 EXPLAINED = 1.3  # [-] a unit explains the friction up to this factor: one day differs as much from another
 BEYOND = 1.5  # [-] of the highest identified pressure, up to which one below the lowest may be in another unit
-HALF = 0.06  # [-] how near to a half or twice the friction counts as such, if the seal file states less
+HALF = 0.06  # [-] how near to the friction, a half or twice of it counts as such, if the seal file states less
 HALVED = 0.7  # [-] a ratio above it is nearer to 1 than to a half
 FEWEST_REVERSALS = 3  # that tell a fault
 LAST = 12  # reversals that tell the ratio; older ones tell an area
@@ -64,6 +64,8 @@ def likely_reason(seals: tuple[SealNumbers, ...], reversals: Sequence[Reversal])
         return fault
     newest = reversals[-1]
     ratio = median(reversal.ratio for reversal in reversals[-LAST:])
+    if abs(ratio - 1.0) < HALF:
+        return ''
     law = friction_of_seals(seals, newest.pressure_a, newest.pressure_b, 0.0)
     stated = max(2.0 * law.coulomb_friction_std / law.coulomb_friction, HALF) if law.coulomb_friction > 0.0 else HALF
     shown = f'the force sum shows {ratio:.2f} times the friction of the seal file'

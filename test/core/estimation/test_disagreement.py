@@ -119,7 +119,6 @@ def test_the_last_twelve_reversals_count_and_no_older_one():
         (0.61, 0.1, False),
         (0.69, 0.4, True),  # a ratio above 0.7 is nearer to 1 than to a half
         (0.71, 0.4, False),
-        (1.0, 0.9, False),
         (1.89, 0.01, True),  # within 6 % of twice the friction, whatever the seal file states
         (1.87, 0.01, False),
         (2.11, 0.01, True),
@@ -133,6 +132,13 @@ def test_a_ratio_near_a_half_or_two_may_be_an_area_and_any_other_is_another_seal
     assert said.startswith(f'the force sum shows {ratio:.2f} times the friction of the seal file: ')
     assert ('is an area in it halved or doubled?' in said) is is_area
     assert 'another seal' in said
+
+
+@pytest.mark.parametrize(
+    ('ratio', 'is_reason'), [(0.93, True), (0.95, False), (1.0, False), (1.05, False), (1.07, True)]
+)
+def test_the_friction_of_the_file_is_no_reason_whatever_marked_the_samples(ratio, is_reason):
+    assert bool(likely_reason(constant(), shown(*[ratio] * 4))) is is_reason
 
 
 def test_a_law_without_friction_leaves_6_percent():
