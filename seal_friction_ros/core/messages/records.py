@@ -140,9 +140,7 @@ class FrictionEstimate(NamedTuple):
 
     stamp: int  # [ns] of the velocity sample
     coulomb_friction: float  # [N] magnitude of the friction of all seals while sliding
-    coulomb_friction_std: (
-        float  # [N] one standard deviation of a new reading; at least ``friction_force_std``
-    )
+    coulomb_friction_std: float  # [N] one standard deviation of a new reading; at least ``friction_force_std``
     breakaway_force: float  # [N] below ``coulomb_friction`` only where a seal has less friction in this direction
     friction_force: float  # [N] ``m a = force_sum - friction_force``
     state: int  # a `FrictionState`
