@@ -56,8 +56,8 @@ def transition(number: int) -> ChangeState.Request:
 def test_each_velocity_sample_is_answered_by_an_estimate_with_its_header():
     with graph() as g:
         g.connect()
-        estimate = g.estimate(5 * SECOND + 7, 0.1, pressure=2e6)
         friction = actuator_friction(default_configuration().parameters().estimator.seals, 2e6, 2e6)
+        estimate = g.estimate(5 * SECOND + 7, 0.1, pressure=2e6, force=friction.coulomb_friction)
         assert (estimate.header.stamp.sec, estimate.header.stamp.nanosec, estimate.header.frame_id) == (5, 7, 'rod')
         assert estimate.coulomb_friction == estimate.friction_force == friction.coulomb_friction
         new_run = math.hypot(NEW_RUN * friction.coulomb_friction, friction.coulomb_friction_std)

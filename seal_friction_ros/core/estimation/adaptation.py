@@ -90,7 +90,11 @@ class AdaptationSettings:
         'changes but the standard deviation and the status. on: estimate and feed-forward use the scale.',
     )
     moving_mass: float = parameter(
-        0.0, unit='kg', lower=0.0, upper=1e6, description='m; 0: unknown, then learnt at even speed only.'
+        0.0,
+        unit='kg',
+        lower=0.0,
+        upper=1e6,
+        description='m; 0: unknown, then learnt at even speed or by the work of strokes.',
     )
     acceleration_max: float = parameter(
         0.05,

@@ -403,7 +403,8 @@ def estimate_at(
     if parameters.has_temperature_scale:
         seen, friction = _at_seal_temperature(parameters, seen, friction, sample.temperature)
     if parameters.adapts:
-        has_turned = velocity * state.swing.way <= 0.0 or abs(state.swing.way) < SHEARED
+        way, is_rigid = state.swing.way, parameters.followed_elasticity is None  # else their shear is followed
+        has_turned = is_rigid and (velocity * way <= 0.0 or abs(way) < SHEARED)
         adapted, estimate = _estimate_with_learnt(parameters, state.adaptation, seen, friction, has_turned)
     else:
         std = friction.coulomb_friction_std

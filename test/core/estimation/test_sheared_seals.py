@@ -147,8 +147,10 @@ def test_stiff_seals_are_rigid_ones_after_a_micrometre():
     off = estimates(parameters(SOFT, use_presliding=False), velocities, 0.0 * velocities)
     assert off == rigid
     turn = len(velocities) // 2
-    settled = [*range(5, turn), *range(turn + 5, len(rigid))]
-    assert [stiff[i] for i in settled] == [rigid[i] for i in settled]
+    for i in (*range(5, turn), *range(turn + 5, len(rigid))):
+        bands = {name: getattr(stiff[i], name) for name in ('coulomb_friction_std', 'friction_force_std')}
+        assert stiff[i] == rigid[i]._replace(**bands)
+        assert stiff[i].friction_force_std <= rigid[i].friction_force_std  # of which nobody knows when they slide
 
 
 def test_at_rest_the_friction_is_the_force_sum_and_the_motion_begins_from_it():
