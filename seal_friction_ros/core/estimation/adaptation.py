@@ -68,11 +68,13 @@ WAVERING = 0.25  # [-] of the friction: root mean square of a drift that nothing
 LASTING_DRIFT = 0.4  # [-] and that drift just now,
 UNPROVEN_DRIFT = 0.2  # [-] or this before the motion has told the friction
 FEWEST_SAMPLES = 4  # in each of two strokes that are compared
-FEWEST_OF_STROKE = 10  # samples in a stroke whose work is a reading
-EVEN = 0.25  # [-] of the samples of such a stroke that may be even: more tell as much
-SHORTEST_WAY = 2e-3  # [m] of such a stroke: a shorter one may be hum of the sensor
-UNKNOWN_DELAY = 5e-3  # [s] standard deviation of the time by which force sum and velocity may be apart
 LONGEST_PAUSE = 60.0  # [s] between them
+FEWEST_OF_STROKE = 10  # samples in a stroke whose work is a reading
+SHORTEST_WAY = 2e-3  # [m] of such a stroke: a shorter one may be hum of the sensor
+EVEN = 0.25  # [-] of its samples that may be even: those are readings of their own
+NOT_GOOD = 0.1  # [-] of its way that may be without a good sample: it is slow where it turns
+SLOW_END = 0.25  # [-] of its mean speed, below which it ends where the rod has hardly any energy left
+UNKNOWN_DELAY = 5e-3  # [s] standard deviation of the time by which force sum and velocity may be apart
 
 
 @dataclass(frozen=True)
@@ -159,7 +161,7 @@ NO_REST = Rest()
 
 
 class Work(NamedTuple):
-    """The present stroke from where the rod turned or rested, by signals after two lags."""
+    """The present stroke since the rod turned or rested, by signals after two lags."""
 
     way: float  # [m] with its sign
     force: float  # [J] of the force sum
@@ -168,10 +170,12 @@ class Work(NamedTuple):
     delayed: float  # [W] work that the force sum does more if it comes a second later
     samples: int
     even: int  # samples of even speed, which are readings of their own
-    is_good: bool  # whether every sample was usable and identified
+    not_good: float  # [m] way of samples that are not usable or not identified
 
 
-NO_WORK = Work(0.0, 0.0, 0.0, 0.0, 0.0, 0, 0, True)
+NO_WORK = Work(0.0, 0.0, 0.0, 0.0, 0.0, 0, 0, 0.0)
+CUT_WORK = Work(0.0, 0.0, 0.0, 0.0, 0.0, 0, 0, 1e300)
+"""Of a stroke that begins at speed: after a gap, or a velocity that was not usable."""
 
 ANY = 1e300  # [N] innovation that nothing is beyond, before the first reading
 
@@ -204,7 +208,7 @@ class AdaptationState(NamedTuple):
     twice: Lagging
     acceleration: float  # [m/s^2] of the velocity after two lags
     way: float  # [m] since the last reading of the filter
-    fastest: float  # [m/s] fastest speed of even motion, which fades over `USUAL_TIME`
+    fastest: float  # [m/s] fastest speed of a reading, which fades over `USUAL_TIME`
     bias: float  # [-] mean of the normalised innovations over `SHORT_TIME`
     filter: FrictionFilter
     by_motion: FrictionFilter  # the filter without readings of a rod that may have rested all the time
@@ -228,7 +232,7 @@ NOT_ADAPTED = AdaptationState(
     strokes=Strokes(),
     rest=NO_REST,
     outlook=NO_OUTLOOK,
-    work=NO_WORK,
+    work=CUT_WORK,
 )
 """State before the first sample."""
 
@@ -298,7 +302,7 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
         if most * friction >= twice.friction * direction >= SETTLED * friction >= LEAST_FRICTION:
             force, law = twice.force_sum - settings.moving_mass * acceleration, twice.friction * direction
             reading = Reading(
-                slide.stamp, force, direction, twice.velocity, way, law, slide.friction_std, rest.loaded, 0.0
+                slide.stamp, force, direction, twice.velocity, way, law, slide.friction_std, rest.loaded, 0.0, 0.0
             )
             strokes = _with_reading(strokes, reading, slide.is_identified)
             if is_outlier:
@@ -307,14 +311,15 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
                 known, way = updated(known, reading), 0.0
                 rest = _told(rest) if fastest >= slide.slow else rest
     has_ended = direction == 0 or state.twice.velocity * twice.velocity <= 0.0
-    if has_ended and _is_reading(state.work, slide):
-        reading = _reading_of_work(state.work, slide, way, rest.loaded)
-        known, way = updated(known, reading), way - reading.way
-        fastest = abs(reading.velocity) if abs(reading.velocity) > fastest else fastest
-        rest = _told(rest)
-    work = NO_WORK if has_ended else state.work
-    work = _worked(work, state.twice, twice, elapsed, is_even, slide.is_usable and slide.is_identified)
-    outlook = outlook_of(settings, known, way, bias, acceleration, may_rest)
+    ends_slowly = _ends_slowly(state.work, state.twice.velocity, slide.slow)
+    if has_ended and ends_slowly and _is_reading(state.work, slide):
+        forgets = fastest < slide.slow  # the slow motion before may have been the zero of its sensor
+        bias, base = 0.0 if forgets else bias, by_motion if forgets else known
+        known, way, at = _taught_by_work(base, state.work, slide, 0.0 if forgets else way, rest.loaded)
+        fastest, rest = at if at > fastest else fastest, _told(rest)
+    begun = (NO_WORK if ends_slowly else CUT_WORK) if has_ended else state.work
+    work = _worked(begun, state.twice, twice, elapsed, is_even, slide.is_usable and slide.is_identified)
+    outlook = outlook_of(settings, known, way, bias, acceleration, speed < slide.slow <= fastest)
     by_motion = known if fastest >= slide.slow else by_motion
     return AdaptationState(
         slide.stamp, once, twice, acceleration, way, fastest, bias, known, by_motion, strokes, rest, outlook, work
@@ -330,40 +335,55 @@ def _worked(work: Work, before: Lagging, twice: Lagging, elapsed: float, is_even
         work.way + way, work.force + 0.5 * (before.force_sum + twice.force_sum) * way,
         work.friction + 0.5 * (before.friction + twice.friction) * way, work.square + velocity * way,
         work.delayed + (before.force_sum - twice.force_sum) * velocity, work.samples + 1,
-        work.even + 1 if is_even else work.even, work.is_good and is_good,
+        work.even + 1 if is_even else work.even, work.not_good if is_good else work.not_good + abs(way),
     )  # fmt: skip
+
+
+@compilable
+def _ends_slowly(work: Work, velocity: float, slow: float) -> bool:
+    """Whether a stroke ends at a small ``velocity`` [m/s]: at an end stop or a fault it does not."""
+    speed = abs(velocity)
+    return speed <= slow or speed * abs(work.way) <= SLOW_END * work.square
 
 
 @compilable
 def _is_reading(work: Work, slide: Slide) -> bool:
     """Whether the work of a whole stroke is a reading: long, of a rod that slid, and hardly even."""
     way = abs(work.way)
-    if not work.is_good or work.samples < FEWEST_OF_STROKE or way < SHORTEST_WAY or work.even > EVEN * work.samples:
+    if work.samples < FEWEST_OF_STROKE or way < SHORTEST_WAY or work.not_good > NOT_GOOD * way:
+        return False
+    if work.even > EVEN * work.samples:
         return False
     return work.square > slide.slow * way and work.friction > LEAST_FRICTION * way
 
 
 @compilable
-def _reading_of_work(work: Work, slide: Slide, way: float, loaded: float) -> Reading:
-    r"""Reading by the work of a stroke between turns or rests, where the rod has no speed: inertia takes no part in it.
+def _taught_by_work(
+    known: FrictionFilter, work: Work, slide: Slide, way: float, loaded: float
+) -> tuple[FrictionFilter, float, float]:
+    r"""Filter after the work of a stroke, the way since its reading [m], and the speed of that [m/s].
+
+    Between turns or rests, where the rod has no speed, inertia does no work:
 
     .. math:: y = \frac{\int \Sigma F\,v\,dt}{\Delta x}, \quad f = \frac{\int f\,|v|\,dt}{|\Delta x|}, \quad
               v = \frac{\int v^2\,dt}{\Delta x}
 
     A force sum that comes later than the velocity does the work of inertia, too: the reading is uncertain by what
-    `UNKNOWN_DELAY` makes of it. It is that of the middle of the stroke.
+    `UNKNOWN_DELAY` makes of it. Its offset is that of the middle of the stroke.
 
     Args:
+        known: The filter.
         work: Of the stroke.
         slide: The sample after the turn.
         way: Of the rod since the last reading [m].
         loaded: Sudden change of the force sum in the rest before [N].
     """
-    return Reading(
-        slide.stamp, work.force / work.way, 1 if work.way > 0.0 else -1, work.square / work.way,
-        way - 0.5 * work.way, work.friction / abs(work.way), slide.friction_std, loaded,
-        UNKNOWN_DELAY * abs(work.delayed / work.way),
+    length, speed = abs(work.way), work.square / work.way
+    reading = Reading(
+        slide.stamp, work.force / work.way, 1 if work.way > 0.0 else -1, speed, way - 0.5 * work.way,
+        work.friction / length, slide.friction_std, loaded, UNKNOWN_DELAY * abs(work.delayed) / length, length,
     )  # fmt: skip
+    return updated(known, reading), 0.5 * work.way, abs(speed)
 
 
 @compilable
@@ -373,7 +393,7 @@ def _interrupted(settings: AdaptationSettings, state: AdaptationState, stamp: in
     strokes = Strokes(NO_STROKE, NO_STROKE, state.strokes.ratio, state.strokes.reversals)
     outlook = outlook_of(settings, known, way, 0.0, 0.0, False)
     return AdaptationState(
-        stamp, newest, newest, 0.0, way, state.fastest, 0.0, known, state.by_motion, strokes, rest, outlook, NO_WORK
+        stamp, newest, newest, 0.0, way, state.fastest, 0.0, known, state.by_motion, strokes, rest, outlook, CUT_WORK
     )
 
 
@@ -550,7 +570,8 @@ def friction_of_sliding(
         uses: Whether the estimate uses what is learnt.
 
     Returns:
-        Friction of the estimate; friction by the filter with the sign of the velocity, without bounds [N].
+        Friction of the estimate; friction by the filter with the sign of the velocity, without bounds [N]; whether it
+        contradicts.
     """
     coulomb, file_std, added = friction.coulomb_friction, friction.coulomb_friction_std, friction.velocity_friction
     law, known, is_proven = coulomb + added, state.filter, state.outlook.is_proven

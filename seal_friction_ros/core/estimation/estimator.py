@@ -506,7 +506,8 @@ def _estimate_with_learnt(
             sliding = adapted.coulomb_friction + adapted.velocity_friction
             left -= sliding if velocity > 0.0 else -sliding
             if has_turned and abs(left) > BAND_95 * std:
-                std = 2.0 * sliding / BAND_95
+                wider = (sliding + (sliding if sliding > abs(found) else abs(found))) / BAND_95
+                std = wider if wider > std else std
                 adapted = replace(adapted, coulomb_friction_std=std)
     if contradicts:
         status |= BITS.MODEL_DISAGREES
@@ -719,7 +720,7 @@ def estimate_of(
         elif not status & _NO_FORCE_SUM:
             state, direction, force = state_friction(velocity, force_sum, True, sliding, breakaway)
     std = std if state != UNKNOWN else -1.0
-    return FrictionEstimate(  # by position, as every record of each sample: names take twice the time
+    return FrictionEstimate(  # by position, as every record of each sample: that takes less time than names
         stamp, coulomb, friction.coulomb_friction_std, breakaway, force, state, direction, status, input_age, scale,
         scale_std, offset, residual, std,
     )  # fmt: skip
