@@ -14,6 +14,7 @@ from harness.closed_loop_bags import START, write_closed_loop
 from harness.example_bags import read_whole, rewrite, write_inputs, write_recorded
 from harness.monitor_process import shown
 from harness.page_in_browser import violations
+from mcap.reader import make_reader
 from paths import ROOT
 
 from seal_friction_ros.core.friction.states import FrictionState
@@ -223,8 +224,11 @@ def test_a_page_that_asks_on_is_told_why_it_is_refused(loop: Path):
 def test_damage_ends_what_is_shown_and_the_verdict_says_so(tmp_path: Path):
     shutil.copytree(ROOT / 'bags' / 'pull_test', damaged := tmp_path / 'pull_test')
     (file,) = damaged.glob('*.mcap')
+    with file.open('rb') as stream:
+        chunks = make_reader(stream).get_summary().chunk_indexes
+    chunk = chunks[len(chunks) // 2]
     content = bytearray(file.read_bytes())
-    content[len(content) // 2] ^= 255  # in the messages of a chunk
+    content[chunk.chunk_start_offset + chunk.chunk_length // 2] ^= 255
     file.write_bytes(content)
     view = read_whole(RecordedView(damaged))
     now = view.view('', -1.0)['now']
