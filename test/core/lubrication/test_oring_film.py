@@ -79,16 +79,12 @@ def test_film_reaches_no_farther_than_the_face_of_the_ring(sealed, monkeypatch):
 
 @pytest.mark.parametrize('lines', [17, pytest.param(65, marks=pytest.mark.long)])
 def test_under_a_high_pressure_the_film_ends_outside_the_contact_where_the_face_turns_to_the_groove(lines):
-    """At 69 bar the wall of the groove is next to the contact; the gap opens there by 100 um within 60 um.
-
-    The film ends half a cell, 14 um, beyond the centre of its last cell.
-    """
+    """At 69 bar the wall of the groove is next to the contact; the gap opens there by 100 um within 60 um."""
     ring = dataclasses.replace(ring_on('rod'), numerics=OringNumerics(lines=lines))
     film = oring_film(case_of(ring), ring, 6.9e6)
-    gap = film.start.gap
-    solid, _ = film.model.contact.asperity_pressure(gap)
-    assert gap.min() > 0.0
-    assert 1.5 * gap[-1] - 0.5 * gap[-2] > 3e-6
+    solid, _ = film.model.contact.asperity_pressure(film.start.gap)
+    assert film.start.gap.min() > 0.0
+    assert film.start.gap[-1] > 3e-6
     assert solid[-1] < 1e-3 * solid.max()
 
 
