@@ -69,10 +69,8 @@ LASTING_DRIFT = 0.4  # [-] and that drift just now,
 UNPROVEN_DRIFT = 0.2  # [-] or this before the motion has told the friction
 FEWEST_SAMPLES = 4  # in each of two strokes that are compared
 LONGEST_PAUSE = 60.0  # [s] between them
-FEWEST_OF_STROKE = 10  # samples in a stroke whose work is a reading
-SHORTEST_WAY = 2e-3  # [m] of such a stroke: a shorter one may be hum of the sensor
-EVEN = 0.25  # [-] of its samples that may be even: those are readings of their own
-NOT_GOOD = 0.1  # [-] of its way that may be without a good sample: it is slow where it turns
+SHORTEST_WAY = 2e-3  # [m] of a stroke whose work is a reading: a shorter one may be hum of the sensor
+OTHERWISE = 0.1  # [-] of its way that may be of samples that are not identified, as where it turns, or even
 SLOW_END = 0.25  # [-] of its mean speed, below which it ends where the rod has hardly any energy left
 UNKNOWN_DELAY = 5e-3  # [s] standard deviation of the time by which force sum and velocity may be apart
 
@@ -168,13 +166,11 @@ class Work(NamedTuple):
     friction: float  # [J] of the friction of the law
     square: float  # [m^2/s] of the velocity, over the time
     delayed: float  # [W] work that the force sum does more if it comes a second later
-    samples: int
-    even: int  # samples of even speed, which are readings of their own
-    not_good: float  # [m] way of samples that are not usable or not identified
+    otherwise: float  # [m] way of samples that are not usable, not identified, or even: readings of their own
 
 
-NO_WORK = Work(0.0, 0.0, 0.0, 0.0, 0.0, 0, 0, 0.0)
-CUT_WORK = Work(0.0, 0.0, 0.0, 0.0, 0.0, 0, 0, 1e300)
+NO_WORK = Work(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+CUT_WORK = Work(0.0, 0.0, 0.0, 0.0, 0.0, 1e300)
 """Of a stroke that begins at speed: after a gap, or a velocity that was not usable."""
 
 ANY = 1e300  # [N] innovation that nothing is beyond, before the first reading
@@ -318,7 +314,7 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
         known, way, at = _taught_by_work(base, state.work, slide, 0.0 if forgets else way, rest.loaded)
         fastest, rest = at if at > fastest else fastest, _told(rest)
     begun = (NO_WORK if ends_slowly else CUT_WORK) if has_ended else state.work
-    work = _worked(begun, state.twice, twice, elapsed, is_even, slide.is_usable and slide.is_identified)
+    work = _worked(begun, state.twice, twice, elapsed, slide.is_usable and slide.is_identified and not is_even)
     outlook = outlook_of(settings, known, way, bias, acceleration, speed < slide.slow <= fastest)
     by_motion = known if fastest >= slide.slow else by_motion
     return AdaptationState(
@@ -327,15 +323,15 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
 
 
 @compilable
-def _worked(work: Work, before: Lagging, twice: Lagging, elapsed: float, is_even: bool, is_good: bool) -> Work:
+def _worked(work: Work, before: Lagging, twice: Lagging, elapsed: float, counts: bool) -> Work:
     """Work of the stroke after one more sample."""
     velocity = 0.5 * (before.velocity + twice.velocity)
     way = velocity * elapsed
     return Work(
         work.way + way, work.force + 0.5 * (before.force_sum + twice.force_sum) * way,
         work.friction + 0.5 * (before.friction + twice.friction) * way, work.square + velocity * way,
-        work.delayed + (before.force_sum - twice.force_sum) * velocity, work.samples + 1,
-        work.even + 1 if is_even else work.even, work.not_good if is_good else work.not_good + abs(way),
+        work.delayed + (before.force_sum - twice.force_sum) * velocity,
+        work.otherwise if counts else work.otherwise + abs(way),
     )  # fmt: skip
 
 
@@ -348,11 +344,9 @@ def _ends_slowly(work: Work, velocity: float, slow: float) -> bool:
 
 @compilable
 def _is_reading(work: Work, slide: Slide) -> bool:
-    """Whether the work of a whole stroke is a reading: long, of a rod that slid, and hardly even."""
+    """Whether the work of a whole stroke is a reading: long, of a rod that slid unevenly."""
     way = abs(work.way)
-    if work.samples < FEWEST_OF_STROKE or way < SHORTEST_WAY or work.not_good > NOT_GOOD * way:
-        return False
-    if work.even > EVEN * work.samples:
+    if way < SHORTEST_WAY or work.otherwise > OTHERWISE * way:
         return False
     return work.square > slide.slow * way and work.friction > LEAST_FRICTION * way
 

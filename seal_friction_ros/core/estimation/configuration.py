@@ -176,7 +176,7 @@ class Configuration:
         return PipelineParameters(EstimatorParameters(self.settings, seals, self.adaptation), self.feedforward)
 
 
-ALGORITHM_VERSION = 11
+ALGORITHM_VERSION = 12
 """Version of estimator and feed-forward: it changes when the same messages give other bytes.
 
 1: until the feed-forward had one gain, and time was the stamps of the messages. 2: until one filter learnt the
@@ -184,7 +184,7 @@ friction. 3: until its noise was a share of the usual friction. 5: until it told
 scale. 6: until the band held what a direction shows beside the friction, and `friction_force` had one of its own. 7:
 until a slow rod might be one at rest whose velocity has a zero. 8: until a rod that creeps was good. 9:
 until a sudden change of the force sum at rest might be a load at the next reversal. 10: until the work of a stroke was
-a reading, and the band just after a turn held both directions.
+a reading, and the band just after a turn held both directions. 11: until even samples counted by their way in a stroke.
 """
 
 _RENAMED = {'coulomb_scale': 'scale'}  # settings of version 1

@@ -233,7 +233,8 @@ class FrictionReadings:
         """
         if self.are_samples:
             one_motion = (np.diff(self.at.direction) == 0.0) & (np.diff(self.source) == 0)
-            return np.full(self.count, math.sqrt(0.5 * float(np.mean(np.diff(rest)[one_motion] ** 2))))
+            square = float(np.mean(np.diff(rest)[one_motion] ** 2)) if one_motion.any() else 0.0
+            return np.full(self.count, math.sqrt(0.5 * square))
         if not self.samples:
             return np.zeros(self.count)
         return np.array(

@@ -237,15 +237,22 @@ def deviations_in_std(
     """Deviations of ``tested`` over the standard deviation of a band that is made from ``trained`` alone [-], (n,).
 
     The band comes from the groups of ``trained``, each left out in turn; that of a law with priors from its posterior.
-    ``in_addition`` is as of `prediction_uncertainty`.
+    That is one of the friction, so the noise of the sensors is added for ``tested``. ``in_addition`` is as of
+    `prediction_uncertainty`.
     """
+    _, friction, deviation = predict(law, trained, tested, near)
     if law.has_prior:
         band = model_uncertainty(model_with_priors(law, trained), trained, in_addition)
-    else:
-        inner = cross_validate(law, trained, near, tick)
-        band = prediction_uncertainty(inner.predicted, inner.deviation, len(trained.groups), in_addition)
-    _, friction, deviation = predict(law, trained, tested, near)
+        return _with_noise(deviation, band.std(friction), tested)
+    inner = cross_validate(law, trained, near, tick)
+    band = prediction_uncertainty(inner.predicted, inner.deviation, len(trained.groups), in_addition)
     return np.asarray(np.abs(deviation) / np.maximum(band.std(friction), 1e-12))
+
+
+def _with_noise(deviation: FloatArray, std: FloatArray, readings: FrictionReadings) -> FloatArray:
+    """Deviations of readings over the standard deviation of the friction and the noise of their sensors [-], (n,)."""
+    noise = readings.noise(readings.at.direction * deviation)
+    return np.asarray(np.abs(deviation) / np.maximum(np.hypot(std, noise), 1e-12))
 
 
 def deviations_of_left_out(
@@ -259,13 +266,12 @@ def deviations_of_left_out(
     """
     ratios = np.empty(readings.count)
     if law.has_prior:
-        model = model_with_priors(law, readings)
+        model, std = model_with_priors(law, readings), np.empty(readings.count)
         friction, deviation, _ = friction_model.left_out(model, readings)
         for out in readings.groups:
             others = friction_model.without_group(model, out)
-            std = model_uncertainty(others, readings.taken(~out), 0.0).std(friction[out])
-            ratios[out] = np.abs(deviation[out]) / np.maximum(std, 1e-12)
-        return ratios
+            std[out] = model_uncertainty(others, readings.taken(~out), 0.0).std(friction[out])
+        return _with_noise(deviation, std, readings)
     for out in readings.groups:
         trained = readings.taken(~out) if len(readings.groups) >= 3 else readings
         ratios[out] = deviations_in_std(law, trained, readings.taken(out), near, tick=tick)

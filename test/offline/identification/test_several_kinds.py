@@ -234,3 +234,9 @@ def test_a_seal_file_that_another_made_is_not_overwritten(tmp_path):
     run = Run(tmp_path, *write_log(tmp_path, held(GRID, rng())), *KINDS)
     assert run.code == 2
     assert (tmp_path / 'seal_rod.yaml').read_text() == 'name: mine\n'
+
+
+def test_the_band_holds_left_out_samples_of_a_swept_log_with_the_noise_of_their_sensors(tmp_path):
+    run = Run(tmp_path, *write_log(tmp_path, swept(60.0)), *KINDS)
+    assert run.code == 0, run.errors
+    assert 0.90 <= run.figures['band_coverage'] <= 0.99
