@@ -65,7 +65,7 @@ def test_health_finds_the_time_of_a_change(capsys, tmp_path):
 
 
 def test_a_day_beyond_its_limits_is_an_alarm(week, capsys):
-    _, told = health(capsys, week[3], '--scale-high', '1.1')
+    _, told = health(capsys, week[3], '--scale-high', '1.05')
     assert told['bags'][0]['alarms']
     assert not health(capsys, week[0])[1]['bags'][0]['alarms']
 
