@@ -83,7 +83,7 @@ def strokes(seconds: float, seed: int = 5, slowest: float = 0.01, fastest: float
 
 
 def swinging(seconds: float, amplitude: float, frequency: float) -> Rod:
-    """A sine, which is never even."""
+    """A sine, which is hardly ever even."""
     phase = 2.0 * np.pi * frequency * PERIOD * np.arange(round(seconds / PERIOD))
     x, velocity = -amplitude * np.cos(phase), 2.0 * np.pi * frequency * amplitude * np.sin(phase)
     friction = COULOMB * np.sign(velocity)

@@ -184,8 +184,8 @@ friction. 3: until its noise was a share of the usual friction. 5: until it told
 scale. 6: until the band held what a direction shows beside the friction, and `friction_force` had one of its own. 7:
 until a slow rod might be one at rest whose velocity has a zero. 8: until a rod that creeps was good. 9:
 until a sudden change of the force sum at rest might be a load at the next reversal. 10: until the work of a stroke was
-a reading, and the band just after a turn held both directions. 11: until even samples counted by
-their way in a stroke, a step widened the band without a bit, and the asymmetry of another day was 0.1.
+a reading, and the band just after a turn held both directions. 11: until even samples counted by their way in a stroke,
+a step widened the band without a bit, and the prior of the asymmetry was 0.1.
 """
 
 _RENAMED = {'coulomb_scale': 'scale'}  # settings of version 1

@@ -47,7 +47,7 @@ from seal_friction_ros.core.messages.records import NEVER
 SCALE_PRIOR = 0.3  # [-] of another day, beside the deviation of the seal file
 COULOMB_PRIOR = 0.3  # [-] share
 VISCOUS_PRIOR = 2.0  # [s/m] share per speed
-ASYMMETRY_PRIOR = 0.1  # [-] so 15 % of a friction 1.25 times that of the file are in the band
+ASYMMETRY_PRIOR = 0.1  # [-] so that 15 % of a friction 1.25 times that of the file are in the band
 OFFSET_PRIOR = 10.0  # [-] share
 GRADIENT_PRIOR = 30.0  # [1/m] share over the way
 # Random walks: one standard deviation after one second.
