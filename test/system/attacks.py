@@ -5,7 +5,8 @@
 wrong, or fewer than 80 % of the samples of a clean machine have status 0.
 
 ``--random`` instead draws so many machines, each by its number: mass, known or not, strokes or sines, and one to three
-attacks at once. Exit code 1 if more than 0.5 % of the samples with status 0 are wrong in the mean.
+attacks at once (of two that change the velocity the later one counts). Exit code 1 if the share of wrong samples among
+those with status 0, mean over machines and modes, is above 0.5 %.
 """
 
 import sys
@@ -83,7 +84,7 @@ def strokes(seconds: float, seed: int = 5, slowest: float = 0.01, fastest: float
 
 
 def swinging(seconds: float, amplitude: float, frequency: float) -> Rod:
-    """A sine, which is hardly ever even."""
+    """A sine from a turn on."""
     phase = 2.0 * np.pi * frequency * PERIOD * np.arange(round(seconds / PERIOD))
     x, velocity = -amplitude * np.cos(phase), 2.0 * np.pi * frequency * amplitude * np.sin(phase)
     friction = COULOMB * np.sign(velocity)
@@ -219,7 +220,7 @@ ATTACKS: dict[str, Callable[[Rod], Rod]] = {
 
 
 ALONE = ('velocity zero', 'hum', 'vibration')
-"""Beginning of the names of attacks that are nothing beside others: signals of their own, and an attack on the rest"""
+"""Beginnings of the names of attacks that are not combined: they replace the rod, or need its rests."""
 
 
 class Machine(NamedTuple):

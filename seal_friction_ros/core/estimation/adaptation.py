@@ -70,7 +70,7 @@ UNPROVEN_DRIFT = 0.2  # [-] or this before the motion has told the friction
 FEWEST_SAMPLES = 4  # in each of two strokes that are compared
 LONGEST_PAUSE = 60.0  # [s] between them
 SHORTEST_WAY = 2e-3  # [m] of a stroke whose work is a reading: a shorter one may be hum of the sensor
-OTHERWISE = 0.1  # [-] of its way that may be of samples that are not identified, as where it turns, or even
+OTHERWISE = 0.1  # [-] of its way that may be of samples that are even, not usable or not identified, as where it turns
 SLOW_END = 0.25  # [-] of its mean speed, below which it ends where the rod has hardly any energy left
 UNKNOWN_DELAY = 5e-3  # [s] standard deviation of the time by which force sum and velocity may be apart
 

@@ -262,7 +262,7 @@ def deviations_of_left_out(
 
     For each group, law and uncertainty come from the other groups alone, the uncertainty by leaving out each of those
     in turn. Two groups are too few for that: the band of all readings is used. The terms of a law with priors are those
-    that all readings show.
+    that all readings show, and the noise of the sensors, from neighbours among the readings, is added to its band.
     """
     ratios = np.empty(readings.count)
     if law.has_prior:
