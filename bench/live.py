@@ -10,7 +10,8 @@ Percentiles are those of a round, and of them the median over all rounds; so is 
 by round: a slow moment of the machine is one bad round, not a wrong result. The maximum and what is missed are of all.
 
 ``--before TREE`` measures the estimator beside that of another checkout, which has its own ``.venv``, instead of bare
-nodes. The ratio is close to 1 then: it is given with its standard error, and rounds are longer.
+nodes. The ratio is close to 1 then: it is given with its standard error, and rounds are longer. Processor time differs
+by a tenth from one launch of the same node to the next: ``--launches 10`` starts all nodes anew so often.
 
 ``--busy 2 --realtime 50`` keeps both cores of a small machine busy and gives all processes real-time priority.
 """
@@ -278,11 +279,16 @@ def node(case: str, folder: Path, realtime: int, before: Path | None = None) -> 
 
 
 def measure(
-    cases: Collection[str], lengths: Rounds, seconds: float, realtime: int, rates: tuple[int, ...], before: Path | None
-) -> dict[str, dict[int, Figures]]:
-    """Ask all of them in turn, to and fro."""
+    cases: Collection[str],
+    lengths: Rounds,
+    seconds: float,
+    realtime: int,
+    rates: tuple[int, ...],
+    before: Path | None,
+    found: dict[str, dict[int, Figures]],
+) -> None:
+    """Launch all of them, ask them in turn, to and fro, and add what was found."""
     os.environ[RANGE] = 'LOCALHOST'
-    found = {case: {rate: Figures() for rate in rates} for case in cases}
     with ExitStack() as stack, Progress(console=Console(stderr=True)) as progress:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         askers = [stack.enter_context(node(case, folder, realtime, before)) for case in cases]
@@ -293,7 +299,6 @@ def measure(
                 for asker in askers[:: 1 if turn % 2 == 0 else -1]:
                     ask(asker, rate, lengths, found[asker.case][rate])
                     progress.advance(task)
-    return found
 
 
 def ratios(
@@ -327,6 +332,7 @@ def main() -> int:
     parser.add_argument('--rates', type=int, nargs='+', default=list(RATES), help='[Hz]')
     parser.add_argument('--realtime', type=int, default=0, help='SCHED_FIFO priority of all processes; 0: none')
     parser.add_argument('--busy', type=int, default=0, help='processes that compute without end beside them')
+    parser.add_argument('--launches', type=int, default=1, help='of each node; the seconds are divided among them')
     parser.add_argument('--before', type=Path, metavar='TREE', help='another checkout, with its own .venv')
     parser.add_argument('--echo', help=argparse.SUPPRESS)
     parser.add_argument('--json', action='store_true')
@@ -340,9 +346,10 @@ def main() -> int:
     sys.setswitchinterval(1e-4)
     busy = [subprocess.Popen([sys.executable, '-c', _BUSY]) for _ in range(arguments.busy)]
     try:
-        found = measure(
-            compared, lengths, arguments.seconds, arguments.realtime, tuple(arguments.rates), arguments.before
-        )
+        rates, seconds = tuple(arguments.rates), arguments.seconds / arguments.launches
+        found = {case: {rate: Figures() for rate in rates} for case in compared}
+        for _ in range(arguments.launches):
+            measure(compared, lengths, seconds, arguments.realtime, rates, arguments.before, found)
     finally:
         for process in busy:
             process.kill()

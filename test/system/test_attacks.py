@@ -1,7 +1,7 @@
 """A short form of `attacks`: what is called good is right, whatever is done to the signals."""
 
 import pytest
-from attacks import ATTACKS, CLEAN, attacked
+from attacks import ATTACKS, CLEAN, Machine, attacked, estimated, random_machine, strokes, with_friction
 
 QUICK = (
     'offset of the friction',
@@ -28,3 +28,19 @@ def test_a_clean_machine_is_called_good(name):
     found = attacked(name, 'observe', 12.0)
     assert found.good > 0.9
     assert found.wrong <= 0.001
+
+
+@pytest.mark.parametrize('mode', ['observe', 'on'])
+def test_a_friction_that_doubles_within_strokes_is_in_the_band_and_leaves_most_samples_good(mode):
+    """A step may be of load or of friction until the next reversal: the band holds both, and needs no mark."""
+    rod = strokes(20.0)
+    found = estimated(Machine(with_friction(rod, rod.friction * (1.0 + rod.time // 1.3 % 2))), mode)
+    assert found.wrong <= 0.005
+    assert found.good > 0.6
+
+
+def test_a_random_machine_is_that_of_its_number():
+    one, again = random_machine(7, 3.0), random_machine(7, 3.0)
+    assert one.name == again.name
+    assert (one.rod.force_sum == again.rod.force_sum).all()
+    assert one.name != random_machine(8, 3.0).name

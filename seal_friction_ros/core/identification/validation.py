@@ -240,10 +240,12 @@ def deviations_in_std(
     That is one of the friction, so the noise of the sensors is added for ``tested``. ``in_addition`` is as of
     `prediction_uncertainty`.
     """
-    _, friction, deviation = predict(law, trained, tested, near)
     if law.has_prior:
+        tested = tested.as_means
+        _, friction, deviation = predict(law, trained, tested, near)
         band = model_uncertainty(model_with_priors(law, trained), trained, in_addition)
         return _with_noise(deviation, band.std(friction), tested)
+    _, friction, deviation = predict(law, trained, tested, near)
     inner = cross_validate(law, trained, near, tick)
     band = prediction_uncertainty(inner.predicted, inner.deviation, len(trained.groups), in_addition)
     return np.asarray(np.abs(deviation) / np.maximum(band.std(friction), 1e-12))
@@ -267,7 +269,7 @@ def deviations_of_left_out(
     ratios = np.empty(readings.count)
     if law.has_prior:
         model, std = model_with_priors(law, readings), np.empty(readings.count)
-        friction, deviation, _ = friction_model.left_out(model, readings)
+        friction, deviation, _ = friction_model.left_out(model, readings.as_means)
         for out in readings.groups:
             others = friction_model.without_group(model, out)
             std[out] = model_uncertainty(others, readings.taken(~out), 0.0).std(friction[out])

@@ -272,6 +272,14 @@ def test_the_work_of_a_fast_stroke_forgets_what_the_slow_motion_before_has_taugh
     assert learnt(adapted(fast, NEVER_EVEN, crept)).scale == pytest.approx(45.0 / 40.0, rel=0.03)
 
 
+@pytest.mark.parametrize(('even', 'counts'), [(0.05, True), (0.2, False)])
+def test_the_work_of_a_stroke_counts_beside_its_even_samples_only_if_they_are_a_small_part_of_its_way(even, counts):
+    """On a sine, acceleration over its largest is the share of the way that is more even than that."""
+    settings = AdaptationSettings(acceleration_max=even * 0.1 * 2.0 * math.pi / 0.8)
+    turned = adapted(swinging(20.0, seconds=9.85), settings)  # 0.06 s ago
+    assert ((turned.stamp - turned.filter.stamp) * 1e-9 < 0.1) == counts
+
+
 def test_the_work_of_a_stroke_of_less_than_2_mm_is_no_reading():
     assert adapted(swinging(20.0, speed=0.011, period=0.4), NEVER_EVEN).filter == NOT_BEGUN
 
