@@ -11,5 +11,5 @@ def learnt_state(
 ) -> AdaptationState:
     """``state`` with ``changes``, and the outlook that belongs to them."""
     state = state._replace(**changes)
-    outlook = outlook_of(settings, state.filter, state.way, state.bias, state.acceleration, False)
+    outlook = outlook_of(settings, state.filter, state.way, state.acceleration, False)
     return state._replace(outlook=outlook)

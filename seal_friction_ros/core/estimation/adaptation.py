@@ -5,12 +5,12 @@ even is one, too, by its work: from a turn or a rest to the next one inertia doe
 and velocity go through **the same two lags**, of which the acceleration is taken: so inertia and friction are compared
 at one and the same time, also while the rod accelerates. Nothing is learnt at rest or with a bad input.
 
-**Consistency.** Each sample of a sliding rod is compared with what the filter expects. An innovation of more than
-`IMPLAUSIBLE` standard deviations, or a mean over `SHORT_TIME` of more than `LASTING`, is not explained by anything that
-the filter knows: then nobody knows whether it is friction, so the estimate is marked, whatever caused it. So is one
-whose force sum only an offset explains, before both directions have told friction from offset: the rod may be held. A
-slow rod that was faster before may be at rest while its sensor has a zero: outliers are not learnt from there, and mark
-earlier.
+**Consistency.** Each sample of a sliding rod is compared with what the filter expects. What drifts beside that widens
+the band: it may be friction. An innovation of more than `IMPLAUSIBLE` standard deviations is not explained by anything
+that the filter knows, so the estimate is marked, whatever caused it. So is one whose drift has been larger than half
+the friction, and one whose force sum only an offset explains, before both directions have told friction from offset:
+the rod may be held. A slow rod that was faster before may be at rest while its sensor has a zero: outliers are not
+learnt from there, and mark earlier.
 
 Source: normalised innovations as a check of consistency, [BarShalom2001]_ chapter 5; friction as the half difference of
 the two directions, as the thesis evaluates Tables A-1 to A-3. All numbers are our choice.
@@ -53,20 +53,17 @@ LEARNING_INTERVAL = 9_500_000  # [ns] least time between two samples that are le
 LEAST_STD = 0.01  # [-] of the friction, below which no standard deviation is believed
 IMPLAUSIBLE = 5.0  # [-] innovation over its standard deviation that is a fault of its own
 WRONG_DIRECTION = 1.5  # [-] of the friction that a sample misses whose direction is wrong: it misses twice the friction
-LASTING = 2.5  # [-] mean of it over `SHORT_TIME`
-SHORT_TIME = 0.1  # [s]
 STRIBECK = 0.2  # [-] of the friction: standard deviation of what it is more when slow,
 STRIBECK_SPEED = 0.008  # [m/s] as from this speed
 NEW_RUN = math.hypot(SCALE_PRIOR, COULOMB_PRIOR)  # [-] of the friction: standard deviation of another day
 REST = 0.1  # [s] after a motion in which the force sum may be that of the motion still
+RIPPLE_TIME = 0.1  # [s]
+LONGEST_PRESS = 0.1  # [s] for which a rod may rest under the breakaway force
 LEAP_AT_REST = 0.3  # [-] sudden change of the force sum at rest over the friction, from which on it may be a load
 AT_ONCE = 2.0  # [-] on the noise of the force sum at rest, which nothing averages
-LONGEST_PRESS = 0.1  # [s] for which a rod may rest under the breakaway force
 LOADED_TIME = 1.0  # [s] of sliding without a reading over which a sudden change at rest is forgotten
 MAY_BE_FRICTION = 0.8  # [-] of what readings have added to the offset since the last reversal, in the band of sliding
-WAVERING = 0.25  # [-] of the friction: root mean square of a drift that nothing explains,
-LASTING_DRIFT = 0.4  # [-] and that drift just now,
-UNPROVEN_DRIFT = 0.2  # [-] or this before the motion has told the friction
+WAVERING = 0.5  # [-] of the friction: root mean square of a drift that nothing explains
 FEWEST_SAMPLES = 4  # in each of two strokes that are compared
 LONGEST_PAUSE = 60.0  # [s] between them
 SHORTEST_WAY = 2e-3  # [m] of a stroke whose work is a reading: a shorter one may be hum of the sensor
@@ -147,7 +144,7 @@ class Rest(NamedTuple):
     """What the force sum does while the rod rests."""
 
     slid: int = NEVER  # [ns] stamp of the last sample of a sliding rod
-    ripple: float = 0.0  # [N^2] mean square of the force sum against its lagging value, over `SHORT_TIME`
+    ripple: float = 0.0  # [N^2] mean square of the force sum against its lagging value, over `RIPPLE_TIME`
     pressed: float = 0.0  # [s] of this rest under the breakaway force, in all
     leapt: float = 0.0  # [N] largest sudden change of the force sum in this rest
     leapt_at: int = NEVER  # [ns] its stamp
@@ -181,7 +178,7 @@ class Outlook(NamedTuple):
 
     is_proven: bool  # whether the motion has told the friction
     status: int  # bit of a drift that nothing explains
-    most: float  # [N] innovation of a single sample that is explained; negative: none, after innovations that last
+    most: float  # [N] innovation of a sample that is explained; negative: none is
     taken_off: float  # [N] of the force sum of a sliding rod: inertia, offset and remainder
     offset: float  # [N] of the force sum where the rod is: its gradient goes on since the last reading
     unsteady_offset: float  # [N] with the remainder
@@ -205,7 +202,6 @@ class AdaptationState(NamedTuple):
     acceleration: float  # [m/s^2] of the velocity after two lags
     way: float  # [m] since the last reading of the filter
     fastest: float  # [m/s] fastest speed of a reading, which fades over `USUAL_TIME`
-    bias: float  # [-] mean of the normalised innovations over `SHORT_TIME`
     filter: FrictionFilter
     by_motion: FrictionFilter  # the filter without readings of a rod that may have rested all the time
     strokes: Strokes
@@ -222,7 +218,6 @@ NOT_ADAPTED = AdaptationState(
     acceleration=0.0,
     way=0.0,
     fastest=0.0,
-    bias=0.0,
     filter=NOT_BEGUN,
     by_motion=NOT_BEGUN,
     strokes=Strokes(),
@@ -245,12 +240,6 @@ class Slide(NamedTuple):
     is_usable: bool  # whether every input is good
     is_identified: bool  # whether the law was identified at this pressure and speed
     slow: float  # [m/s] speed below which a rod may be at rest: the velocity may be the zero of its sensor
-
-
-@compilable
-def is_due(state: AdaptationState, stamp: int) -> bool:
-    """Whether the sample of this stamp is to be learnt from: the last one is old enough, or the clock went back."""
-    return not 0 <= stamp - state.stamp < LEARNING_INTERVAL
 
 
 @compilable
@@ -277,7 +266,7 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     at_first = (velocity - state.once.velocity) / (elapsed + LAG)
     acceleration = (once.velocity - state.twice.velocity) / (elapsed + LAG)
     rest = _rested(settings, state, slide, direction, elapsed)
-    bias, known, strokes = state.bias, state.filter, state.strokes
+    known, strokes = state.filter, state.strokes
     speed, fastest = abs(velocity), state.fastest * (1.0 - elapsed / USUAL_TIME)
     is_even = slide.is_usable and direction != 0 and _is_even(settings, acceleration, at_first, friction)
     fastest = speed if is_even and speed > fastest else fastest
@@ -287,38 +276,32 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     if fastest < slide.slow:
         by_motion = _moved(by_motion, newest_way if state.fastest < slide.slow else way)
     elif state.fastest < slide.slow:  # the slow motion before may have been the zero of its sensor
-        known, way, bias = by_motion, newest_way, 0.0
-    if is_even:
-        is_outlier = False
-        if slide.is_identified and known.stamp != NEVER:
-            missed = _missed(state, newest) / known.innovation_std
-            bias += elapsed / (elapsed + SHORT_TIME) * (between(-IMPLAUSIBLE, missed, IMPLAUSIBLE) - bias)
-            is_outlier = may_rest and abs(missed) > OUTLIER
-        most = JUMPED if slide.is_identified and not strokes.present.is_identified else math.inf
-        if most * friction >= twice.friction * direction >= SETTLED * friction >= LEAST_FRICTION:
-            force, law = twice.force_sum - settings.moving_mass * acceleration, twice.friction * direction
-            reading = Reading(
-                slide.stamp, force, direction, twice.velocity, way, law, slide.friction_std, rest.loaded, 0.0, 0.0
-            )
-            strokes = _with_reading(strokes, reading, slide.is_identified)
-            if is_outlier:
-                known = disregarded(known, reading, elapsed)
-            elif slide.is_identified:
-                known, way = updated(known, reading), 0.0
-                rest = _told(rest) if fastest >= slide.slow else rest
+        known, way = by_motion, newest_way
+    most = JUMPED if slide.is_identified and not strokes.present.is_identified else math.inf
+    if is_even and most * friction >= twice.friction * direction >= SETTLED * friction >= LEAST_FRICTION:
+        force, law = twice.force_sum - settings.moving_mass * acceleration, twice.friction * direction
+        reading = Reading(
+            slide.stamp, force, direction, twice.velocity, way, law, slide.friction_std, rest.loaded, 0.0, 0.0
+        )
+        strokes = _with_reading(strokes, reading, slide.is_identified)
+        if may_rest and slide.is_identified and known.stamp != NEVER and _is_outlier(state, newest):
+            known = disregarded(known, reading, elapsed)
+        elif slide.is_identified:
+            known, way = updated(known, reading), 0.0
+            rest = _told(rest) if fastest >= slide.slow else rest
     has_ended = direction == 0 or state.twice.velocity * twice.velocity <= 0.0
     ends_slowly = _ends_slowly(state.work, state.twice.velocity, slide.slow)
     if has_ended and ends_slowly and _is_reading(state.work, slide):
         forgets = fastest < slide.slow  # the slow motion before may have been the zero of its sensor
-        bias, base = 0.0 if forgets else bias, by_motion if forgets else known
+        base = by_motion if forgets else known
         known, way, at = _taught_by_work(base, state.work, slide, 0.0 if forgets else way, rest.loaded)
         fastest, rest = at if at > fastest else fastest, _told(rest)
     begun = (NO_WORK if ends_slowly else CUT_WORK) if has_ended else state.work
     work = _worked(begun, state.twice, twice, elapsed, slide.is_usable and slide.is_identified and not is_even)
-    outlook = outlook_of(settings, known, way, bias, acceleration, speed < slide.slow <= fastest)
+    outlook = outlook_of(settings, known, way, acceleration, speed < slide.slow <= fastest)
     by_motion = known if fastest >= slide.slow else by_motion
     return AdaptationState(
-        slide.stamp, once, twice, acceleration, way, fastest, bias, known, by_motion, strokes, rest, outlook, work
+        slide.stamp, once, twice, acceleration, way, fastest, known, by_motion, strokes, rest, outlook, work
     )
 
 
@@ -385,9 +368,9 @@ def _interrupted(settings: AdaptationSettings, state: AdaptationState, stamp: in
     """State after a gap: signals and strokes begin anew."""
     known, way, rest = state.filter, state.way, replace(NO_REST, slid=stamp, held=state.rest.held)
     strokes = Strokes(NO_STROKE, NO_STROKE, state.strokes.ratio, state.strokes.reversals)
-    outlook = outlook_of(settings, known, way, 0.0, 0.0, False)
+    outlook = outlook_of(settings, known, way, 0.0, False)
     return AdaptationState(
-        stamp, newest, newest, 0.0, way, state.fastest, 0.0, known, state.by_motion, strokes, rest, outlook, CUT_WORK
+        stamp, newest, newest, 0.0, way, state.fastest, known, state.by_motion, strokes, rest, outlook, CUT_WORK
     )
 
 
@@ -404,7 +387,7 @@ def _rested(settings: AdaptationSettings, state: AdaptationState, slide: Slide, 
     """What the force sum has done in this rest, after one more sample."""
     before, outlook = state.rest, state.outlook
     change, leap = slide.force_sum - state.twice.force_sum, slide.force_sum - state.once.force_sum
-    ripple = before.ripple + elapsed / (elapsed + SHORT_TIME) * (change * change - before.ripple)
+    ripple = before.ripple + elapsed / (elapsed + RIPPLE_TIME) * (change * change - before.ripple)
     held = before.held * (1.0 - elapsed / USUAL_TIME)
     if direction != 0:
         loaded = before.loaded * (1.0 - elapsed / LOADED_TIME)
@@ -494,39 +477,35 @@ def _is_even(settings: AdaptationSettings, acceleration: float, newest: float, f
 
 @compilable
 def outlook_of(
-    settings: AdaptationSettings, known: FrictionFilter, way: float, bias: float, acceleration: float, may_rest: bool
+    settings: AdaptationSettings, known: FrictionFilter, way: float, acceleration: float, may_rest: bool
 ) -> Outlook:
     """What the filter says of the next samples.
 
     An unknown mass explains less of a stroke that is not even: then only a sample that may have the wrong direction
-    contradicts.
+    contradicts. Each one does while the rod may be held.
 
     Args:
         settings: With mass and bounds.
         known: The filter.
         way: Of the rod since the last reading [m].
-        bias: Mean of the normalised innovations [-].
         acceleration: [m/s^2]
         may_rest: Whether the velocity may be the zero of its sensor: then a smaller innovation contradicts.
     """
     inertia = settings.moving_mass * acceleration
     if known.stamp == NEVER:
         return replace(NO_OUTLOOK, taken_off=inertia)
-    friction, unexplained, terms = known.friction, known.unexplained, known.terms
+    friction, terms = known.friction, known.terms
     proven, wavers = known.friction_std <= PROVEN * friction, WAVERING * friction
     most = (OUTLIER if may_rest else IMPLAUSIBLE) * known.innovation_std
-    lasting = LASTING_DRIFT if proven else UNPROVEN_DRIFT
     if settings.moving_mass == 0.0 and abs(acceleration) > settings.acceleration_max:
         wrong_direction = WRONG_DIRECTION * friction
         most = most if most > wrong_direction else wrong_direction
     offset = terms.offset + way * terms.gradient
     may_be_at_rest = not proven and abs(offset + terms.remainder) > BAND_95 * known.friction_std
-    if may_be_at_rest or abs(bias) > LASTING or abs(unexplained.drift) > lasting * friction:
-        most = -1.0
     return Outlook(
         proven,
-        BITS.MODEL_DISAGREES if unexplained.drift_square > wavers * wavers else 0,
-        most,
+        BITS.MODEL_DISAGREES if known.unexplained.drift_square > wavers * wavers else 0,
+        -1.0 if may_be_at_rest else most,
         inertia + offset + terms.remainder,
         offset,
         offset + terms.remainder,
@@ -537,11 +516,11 @@ def outlook_of(
 
 
 @compilable
-def _missed(state: AdaptationState, newest: Lagging) -> float:
-    """What a sample of a sliding rod shows more than was expected [N]."""
+def _is_outlier(state: AdaptationState, newest: Lagging) -> bool:
+    """Whether a sample of a sliding rod is too far from what was expected."""
     direction = 1.0 if newest.velocity > 0.0 else -1.0
     found = friction_magnitude(state.filter.terms, direction, abs(newest.velocity), newest.friction * direction)
-    return newest.force_sum - state.outlook.taken_off - direction * found
+    return abs(newest.force_sum - state.outlook.taken_off - direction * found) > OUTLIER * state.filter.innovation_std
 
 
 @compilable
