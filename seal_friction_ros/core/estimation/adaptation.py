@@ -57,13 +57,13 @@ STRIBECK = 0.2  # [-] of the friction: standard deviation of what it is more whe
 STRIBECK_SPEED = 0.008  # [m/s] as from this speed
 NEW_RUN = math.hypot(SCALE_PRIOR, COULOMB_PRIOR)  # [-] of the friction: standard deviation of another day
 REST = 0.1  # [s] after a motion in which the force sum may be that of the motion still
-RIPPLE_TIME = 0.1  # [s]
+RIPPLE_TIME = 0.1  # [s] over which the ripple of the force sum at rest is a mean
 LONGEST_PRESS = 0.1  # [s] for which a rod may rest under the breakaway force
 LEAP_AT_REST = 0.3  # [-] sudden change of the force sum at rest over the friction, from which on it may be a load
 AT_ONCE = 2.0  # [-] on the noise of the force sum at rest, which nothing averages
 LOADED_TIME = 1.0  # [s] of sliding without a reading over which a sudden change at rest is forgotten
 MAY_BE_FRICTION = 0.8  # [-] of what readings have added to the offset since the last reversal, in the band of sliding
-WAVERING = 0.5  # [-] of the friction: root mean square of a drift that nothing explains
+WAVERING = 0.5  # [-] of the friction: root mean square of a drift from which on a swinging load may leave the band
 FEWEST_SAMPLES = 4  # in each of two strokes that are compared
 LONGEST_PAUSE = 60.0  # [s] between them
 SHORTEST_WAY = 2e-3  # [m] of a stroke whose work is a reading: a shorter one may be hum of the sensor
@@ -240,6 +240,12 @@ class Slide(NamedTuple):
     is_usable: bool  # whether every input is good
     is_identified: bool  # whether the law was identified at this pressure and speed
     slow: float  # [m/s] speed below which a rod may be at rest: the velocity may be the zero of its sensor
+
+
+@compilable
+def is_due(state: AdaptationState, stamp: int) -> bool:
+    """Whether the sample of this stamp is to be learnt from: the last one is old enough, or the clock went back."""
+    return not 0 <= stamp - state.stamp < LEARNING_INTERVAL
 
 
 @compilable
@@ -517,7 +523,7 @@ def outlook_of(
 
 @compilable
 def _is_outlier(state: AdaptationState, newest: Lagging) -> bool:
-    """Whether a sample of a sliding rod is too far from what was expected."""
+    """Whether a sample of a sliding rod is more than `OUTLIER` standard deviations from what was expected."""
     direction = 1.0 if newest.velocity > 0.0 else -1.0
     found = friction_magnitude(state.filter.terms, direction, abs(newest.velocity), newest.friction * direction)
     return abs(newest.force_sum - state.outlook.taken_off - direction * found) > OUTLIER * state.filter.innovation_std

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation.adaptation import (
     LARGEST_INERTIA,
-    LEARNING_INTERVAL,
     NOT_ADAPTED,
     AdaptationSettings,
     AdaptationState,
@@ -22,6 +21,7 @@ from seal_friction_ros.core.estimation.adaptation import (
     adapt,
     friction_at_rest,
     friction_of_sliding,
+    is_due,
 )
 from seal_friction_ros.core.estimation.conditioned_velocity import (
     NOT_CONDITIONED,
@@ -440,7 +440,7 @@ def learn_from(
         seen: The sample after the checks.
         friction: By the seal files.
     """
-    if not parameters.adapts or 0 <= seen.stamp - known.stamp < LEARNING_INTERVAL:
+    if not parameters.adapts or not is_due(known, seen.stamp):
         return known
     status = estimate.status & ~BITS.MODEL_DISAGREES
     law, slow = friction.coulomb_friction + friction.velocity_friction, ZERO_MAX * parameters.settings.stick_velocity

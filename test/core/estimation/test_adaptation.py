@@ -16,6 +16,7 @@ from paths import ROOT
 from seal_friction_ros.core.estimation import estimator
 from seal_friction_ros.core.estimation.adaptation import (
     FEWEST_SAMPLES,
+    LEARNING_INTERVAL,
     LEAST_STD,
     LONGEST_PAUSE,
     NEW_RUN,
@@ -29,6 +30,7 @@ from seal_friction_ros.core.estimation.adaptation import (
     can_be_compared,
     friction_at_rest,
     friction_of_sliding,
+    is_due,
     learnt,
     ratio_of,
 )
@@ -488,6 +490,15 @@ def test_after_a_gap_of_more_than_100_ms_or_a_step_back_acceleration_and_strokes
     if not is_known:
         assert after.acceleration == 0.0
         assert after.filter == state.filter
+
+
+def test_a_sample_is_due_every_10_ms_and_after_time_went_back():
+    state = NOT_ADAPTED._replace(stamp=START)
+    assert not is_due(state, START)
+    assert not is_due(state, START + LEARNING_INTERVAL - 1)
+    assert is_due(state, START + LEARNING_INTERVAL)
+    assert is_due(state, START - SECOND)
+    assert is_due(NOT_ADAPTED, START)
 
 
 # --- strokes ---
