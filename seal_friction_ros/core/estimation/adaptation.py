@@ -1,7 +1,7 @@
 r"""What the motion teaches about the friction: signals made ready for the filter, and what its innovations say.
 
-While the rod slides evenly, the force sum less inertia is a reading for the `friction_filter`. A stroke that is hardly
-even is one, too, by its work: from a turn or a rest to the next one inertia does none. Force sum, friction of the law
+While the rod slides evenly, or its inertia is known (`moving_mass`), the force sum less inertia is a reading for the
+`friction_filter`. Force sum, friction of the law
 and velocity go through **the same two lags**, of which the acceleration is taken: so inertia and friction are compared
 at one and the same time, also while the rod accelerates. Nothing is learnt at rest or with a bad input.
 
@@ -33,6 +33,18 @@ from seal_friction_ros.core.estimation.friction_filter import (
     friction_magnitude,
     updated,
 )
+from seal_friction_ros.core.estimation.moving_mass import (
+    NO_ACCELERATIONS,
+    NO_MASS,
+    Accelerations,
+    Inertia,
+    MovingMass,
+    accelerated,
+    after_stroke,
+    force_of_inertia,
+    inertia_of,
+    is_inertia_known,
+)
 from seal_friction_ros.core.foundation.compiled import compilable, replace
 from seal_friction_ros.core.foundation.limits import between
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
@@ -42,6 +54,7 @@ from seal_friction_ros.core.messages.records import BITS, NEVER
 
 MODES = ('off', 'observe', 'on')
 
+TURNED = 1e-3  # [m] of a stroke after which an accelerated sample is a reading, or shows the mass
 ONE_SIDED_95 = 1.644854  # [-] 95 % of a normal distribution are below it
 LAG = 0.005  # [s] time constant of each of the two lags of all signals, with which the acceleration is taken
 LEAST_FRICTION = 1e-3  # [N] of the law, below which there is nothing to learn
@@ -66,10 +79,6 @@ MAY_BE_FRICTION = 0.8  # [-] of what readings have added to the offset since the
 WAVERING = 0.5  # [-] of the friction: root mean square of a drift from which on a swinging load may leave the band
 FEWEST_SAMPLES = 4  # in each of two strokes that are compared
 LONGEST_PAUSE = 60.0  # [s] between them
-SHORTEST_WAY = 2e-3  # [m] of a stroke whose work is a reading: a shorter one may be hum of the sensor
-OTHERWISE = 0.1  # [-] of its way that may be of samples that are even, not usable or not identified, as where it turns
-SLOW_END = 0.25  # [-] of its mean speed, below which it ends where the rod has hardly any energy left
-UNKNOWN_DELAY = 5e-3  # [s] standard deviation of the time by which force sum and velocity may be apart
 
 
 @dataclass(frozen=True)
@@ -91,14 +100,14 @@ class AdaptationSettings:
         unit='kg',
         lower=0.0,
         upper=1e6,
-        description='m; 0: unknown, then learnt at even speed or by the work of strokes.',
+        description='m; 0: unknown, then learnt from the accelerations of strokes.',
     )
     acceleration_max: float = parameter(
         0.05,
         unit='m/s^2',
         lower=1e-6,
         upper=1e3,
-        description='Largest acceleration that counts as even speed; with a moving mass its inertia counts instead.',
+        description='Largest acceleration that counts as even speed where the inertia is not known.',
     )
     scale_min: float = parameter(0.3, unit='1', lower=0.01, upper=1.0, description='Lowest scale.')
     scale_max: float = parameter(3.0, unit='1', lower=1.0, upper=100.0, description='Highest scale.')
@@ -155,21 +164,6 @@ class Rest(NamedTuple):
 NO_REST = Rest()
 
 
-class Work(NamedTuple):
-    """The present stroke since the rod turned or rested, by signals after two lags."""
-
-    way: float  # [m] with its sign
-    force: float  # [J] of the force sum
-    friction: float  # [J] of the friction of the law
-    square: float  # [m^2/s] of the velocity, over the time
-    delayed: float  # [W] work that the force sum does more if it comes a second later
-    otherwise: float  # [m] way of samples that are not usable, not identified, or even: readings of their own
-
-
-NO_WORK = Work(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-CUT_WORK = Work(0.0, 0.0, 0.0, 0.0, 0.0, 1e300)
-"""Of a stroke that begins at speed: after a gap, or a velocity that was not usable."""
-
 ANY = 1e300  # [N] innovation that nothing is beyond, before the first reading
 
 
@@ -207,7 +201,8 @@ class AdaptationState(NamedTuple):
     strokes: Strokes
     rest: Rest
     outlook: Outlook
-    work: Work
+    mass: MovingMass
+    accelerations: Accelerations  # of the present stroke
 
 
 NO_SIGNALS = Lagging(0.0, 0.0, 0.0)
@@ -223,7 +218,8 @@ NOT_ADAPTED = AdaptationState(
     strokes=Strokes(),
     rest=NO_REST,
     outlook=NO_OUTLOOK,
-    work=CUT_WORK,
+    mass=NO_MASS,
+    accelerations=NO_ACCELERATIONS,
 )
 """State before the first sample."""
 
@@ -274,7 +270,14 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     rest = _rested(settings, state, slide, direction, elapsed)
     known, strokes = state.filter, state.strokes
     speed, fastest = abs(velocity), state.fastest * (1.0 - elapsed / USUAL_TIME)
-    is_even = slide.is_usable and direction != 0 and _is_even(settings, acceleration, at_first, friction)
+    mass, sums = state.mass, state.accelerations
+    if direction == 0 or state.twice.velocity * twice.velocity <= 0.0:
+        mass, sums = after_stroke(mass, sums), NO_ACCELERATIONS
+    sums = replace(sums, way=sums.way + elapsed * abs(twice.velocity))
+    inertia = inertia_of(settings.moving_mass, mass)
+    is_even = slide.is_usable and direction != 0
+    if is_even:
+        is_even = _is_even(settings, inertia, sums.way, acceleration, at_first, friction)
     fastest = speed if is_even and speed > fastest else fastest
     may_rest = speed < slide.slow <= fastest  # a rod that is never faster could not be learnt from at all
     way = state.way + 0.5 * elapsed * (state.twice.velocity + twice.velocity)
@@ -284,89 +287,26 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     elif state.fastest < slide.slow:  # the slow motion before may have been the zero of its sensor
         known, way = by_motion, newest_way
     most = JUMPED if slide.is_identified and not strokes.present.is_identified else math.inf
-    if is_even and most * friction >= twice.friction * direction >= SETTLED * friction >= LEAST_FRICTION:
-        force, law = twice.force_sum - settings.moving_mass * acceleration, twice.friction * direction
-        reading = Reading(
-            slide.stamp, force, direction, twice.velocity, way, law, slide.friction_std, rest.loaded, 0.0, 0.0
-        )
+    is_settled = most * friction >= twice.friction * direction >= SETTLED * friction >= LEAST_FRICTION
+    if is_settled and slide.is_usable and slide.is_identified and sums.way > TURNED:
+        offset = known.terms.offset + way * known.terms.gradient + known.terms.remainder
+        explained = state.outlook.scale * twice.friction + offset
+        sums = accelerated(sums, acceleration, twice.force_sum - explained, elapsed)
+    if is_even and is_settled:
+        force = twice.force_sum - force_of_inertia(inertia, acceleration, friction)
+        law = twice.friction * direction
+        reading = Reading(slide.stamp, force, direction, twice.velocity, way, law, slide.friction_std, rest.loaded)
         strokes = _with_reading(strokes, reading, slide.is_identified)
         if may_rest and slide.is_identified and known.stamp != NEVER and _is_outlier(state, newest):
             known = disregarded(known, reading, elapsed)
         elif slide.is_identified:
             known, way = updated(known, reading), 0.0
             rest = _told(rest) if fastest >= slide.slow else rest
-    has_ended = direction == 0 or state.twice.velocity * twice.velocity <= 0.0
-    ends_slowly = _ends_slowly(state.work, state.twice.velocity, slide.slow)
-    if has_ended and ends_slowly and _is_reading(state.work, slide):
-        forgets = fastest < slide.slow  # the slow motion before may have been the zero of its sensor
-        base = by_motion if forgets else known
-        known, way, at = _taught_by_work(base, state.work, slide, 0.0 if forgets else way, rest.loaded)
-        fastest, rest = at if at > fastest else fastest, _told(rest)
-    begun = (NO_WORK if ends_slowly else CUT_WORK) if has_ended else state.work
-    work = _worked(begun, state.twice, twice, elapsed, slide.is_usable and slide.is_identified and not is_even)
-    outlook = outlook_of(settings, known, way, acceleration, speed < slide.slow <= fastest)
+    outlook = outlook_of(settings, inertia, known, way, acceleration, speed < slide.slow <= fastest)
     by_motion = known if fastest >= slide.slow else by_motion
     return AdaptationState(
-        slide.stamp, once, twice, acceleration, way, fastest, known, by_motion, strokes, rest, outlook, work
+        slide.stamp, once, twice, acceleration, way, fastest, known, by_motion, strokes, rest, outlook, mass, sums
     )
-
-
-@compilable
-def _worked(work: Work, before: Lagging, twice: Lagging, elapsed: float, counts: bool) -> Work:
-    """Work of the stroke after one more sample."""
-    velocity = 0.5 * (before.velocity + twice.velocity)
-    way = velocity * elapsed
-    return Work(
-        work.way + way, work.force + 0.5 * (before.force_sum + twice.force_sum) * way,
-        work.friction + 0.5 * (before.friction + twice.friction) * way, work.square + velocity * way,
-        work.delayed + (before.force_sum - twice.force_sum) * velocity,
-        work.otherwise if counts else work.otherwise + abs(way),
-    )  # fmt: skip
-
-
-@compilable
-def _ends_slowly(work: Work, velocity: float, slow: float) -> bool:
-    """Whether a stroke ends at a small ``velocity`` [m/s]: at an end stop or a fault it does not."""
-    speed = abs(velocity)
-    return speed <= slow or speed * abs(work.way) <= SLOW_END * work.square
-
-
-@compilable
-def _is_reading(work: Work, slide: Slide) -> bool:
-    """Whether the work of a whole stroke is a reading: long, of a rod that slid unevenly."""
-    way = abs(work.way)
-    if way < SHORTEST_WAY or work.otherwise > OTHERWISE * way:
-        return False
-    return work.square > slide.slow * way and work.friction > LEAST_FRICTION * way
-
-
-@compilable
-def _taught_by_work(
-    known: FrictionFilter, work: Work, slide: Slide, way: float, loaded: float
-) -> tuple[FrictionFilter, float, float]:
-    r"""Filter after the work of a stroke, the way since its reading [m], and the speed of that [m/s].
-
-    Between turns or rests, where the rod has no speed, inertia does no work:
-
-    .. math:: y = \frac{\int \Sigma F\,v\,dt}{\Delta x}, \quad f = \frac{\int f\,|v|\,dt}{|\Delta x|}, \quad
-              v = \frac{\int v^2\,dt}{\Delta x}
-
-    A force sum that comes later than the velocity does the work of inertia, too: the reading is uncertain by what
-    `UNKNOWN_DELAY` makes of it. Its offset is that of the middle of the stroke.
-
-    Args:
-        known: The filter.
-        work: Of the stroke.
-        slide: The sample after the turn.
-        way: Of the rod since the last reading [m].
-        loaded: Sudden change of the force sum in the rest before [N].
-    """
-    length, speed = abs(work.way), work.square / work.way
-    reading = Reading(
-        slide.stamp, work.force / work.way, 1 if work.way > 0.0 else -1, speed, way - 0.5 * work.way,
-        work.friction / length, slide.friction_std, loaded, UNKNOWN_DELAY * abs(work.delayed) / length, length,
-    )  # fmt: skip
-    return updated(known, reading), 0.5 * work.way, abs(speed)
 
 
 @compilable
@@ -374,9 +314,21 @@ def _interrupted(settings: AdaptationSettings, state: AdaptationState, stamp: in
     """State after a gap: signals and strokes begin anew."""
     known, way, rest = state.filter, state.way, replace(NO_REST, slid=stamp, held=state.rest.held)
     strokes = Strokes(NO_STROKE, NO_STROKE, state.strokes.ratio, state.strokes.reversals)
-    outlook = outlook_of(settings, known, way, 0.0, False)
+    outlook = outlook_of(settings, inertia_of(settings.moving_mass, state.mass), known, way, 0.0, False)
     return AdaptationState(
-        stamp, newest, newest, 0.0, way, state.fastest, known, state.by_motion, strokes, rest, outlook, CUT_WORK
+        stamp,
+        newest,
+        newest,
+        0.0,
+        way,
+        state.fastest,
+        known,
+        state.by_motion,
+        strokes,
+        rest,
+        outlook,
+        state.mass,
+        NO_ACCELERATIONS,
     )
 
 
@@ -466,24 +418,34 @@ def ratio_of(before: Stroke, after: Stroke) -> float:
 
 
 @compilable
-def _is_even(settings: AdaptationSettings, acceleration: float, newest: float, friction: float) -> bool:
-    """Whether the speed is even: little inertia against the friction [N], or little acceleration if no mass is known.
+def _is_even(
+    settings: AdaptationSettings, inertia: Inertia, way: float, acceleration: float, newest: float, friction: float
+) -> bool:
+    """Whether the speed is even: little acceleration, or little inertia against the friction [N] if it is known.
 
     Args:
         settings: With the limits.
+        inertia: Given or learnt.
+        way: Since the rod turned or rested [m]: elastic seals do not slide at once.
         acceleration: [m/s^2] after two lags, which takes the inertia off.
         newest: [m/s^2] after one: noisier, but it shows a change earlier.
         friction: Of the law [N].
     """
     largest = abs(acceleration) if abs(acceleration) > abs(newest) else abs(newest)
-    if settings.moving_mass > 0.0:
-        return settings.moving_mass * largest <= LARGEST_INERTIA * friction
-    return largest <= settings.acceleration_max
+    is_even = largest <= settings.acceleration_max
+    if is_inertia_known(inertia, largest, friction):
+        return (is_even or way > TURNED) and inertia.mass * largest <= LARGEST_INERTIA * friction
+    return is_even
 
 
 @compilable
 def outlook_of(
-    settings: AdaptationSettings, known: FrictionFilter, way: float, acceleration: float, may_rest: bool
+    settings: AdaptationSettings,
+    inertia: Inertia,
+    known: FrictionFilter,
+    way: float,
+    acceleration: float,
+    may_rest: bool,
 ) -> Outlook:
     """What the filter says of the next samples.
 
@@ -491,19 +453,20 @@ def outlook_of(
     contradicts. Each one does while the rod may be held.
 
     Args:
-        settings: With mass and bounds.
+        settings: With the bounds.
+        inertia: Given or learnt.
         known: The filter.
         way: Of the rod since the last reading [m].
         acceleration: [m/s^2]
         may_rest: Whether the velocity may be the zero of its sensor: then a smaller innovation contradicts.
     """
-    inertia = settings.moving_mass * acceleration
+    force = force_of_inertia(inertia, acceleration, known.friction)
     if known.stamp == NEVER:
-        return replace(NO_OUTLOOK, taken_off=inertia)
+        return replace(NO_OUTLOOK, taken_off=force)
     friction, terms = known.friction, known.terms
     proven, wavers = known.friction_std <= PROVEN * friction, WAVERING * friction
     most = (OUTLIER if may_rest else IMPLAUSIBLE) * known.innovation_std
-    if settings.moving_mass == 0.0 and abs(acceleration) > settings.acceleration_max:
+    if abs(acceleration) > settings.acceleration_max and not is_inertia_known(inertia, acceleration, friction):
         wrong_direction = WRONG_DIRECTION * friction
         most = most if most > wrong_direction else wrong_direction
     offset = terms.offset + way * terms.gradient
@@ -512,7 +475,7 @@ def outlook_of(
         proven,
         BITS.MODEL_DISAGREES if known.unexplained.drift_square > wavers * wavers else 0,
         -1.0 if may_be_at_rest else most,
-        inertia + offset + terms.remainder,
+        force + offset + terms.remainder,
         offset,
         offset + terms.remainder,
         bounded_friction(settings, known, 0.0, known.speed, friction) / friction,
@@ -564,12 +527,14 @@ def friction_of_sliding(
         at_no_speed = slope * coulomb + constant + misfit
         if not lowest * coulomb <= at_no_speed <= highest * coulomb:
             at_no_speed = between(lowest * coulomb, at_no_speed, highest * coulomb)
+        contradicts = law > 0.0 and sliding != found
+        at_no_speed, sliding = _believed(at_no_speed, coulomb), _believed(sliding, law)
         scale = sliding / law if law > 0.0 else 1.0
         stiction, asymmetry = friction.stiction * scale, friction.breakaway_asymmetry * scale
         adapted = ActuatorFriction(
             at_no_speed, std, stiction, friction.in_identified_range, sliding - at_no_speed, asymmetry
         )
-        return adapted, direction * found, law > 0.0 and sliding != found
+        return adapted, direction * found, contradicts
     missed, doubt = found - law, file_std * file_std + known.friction_std * known.friction_std
     std = _about(abs(sliding - law), std)
     adapted = ActuatorFriction(
@@ -616,12 +581,15 @@ def friction_at_rest(
     coulomb_std = _std_of_sliding(state, known.speed, law, file_std)
     is_pressed, can_contradict = state.rest.pressed > LONGEST_PRESS, outlook.is_proven and law > 0.0
     if uses and outlook.is_proven:
-        at_no_speed = bounded_friction(settings, known, 0.0, 0.0, coulomb)
+        contradicts = can_contradict and sliding != found
+        at_no_speed = _believed(bounded_friction(settings, known, 0.0, 0.0, coulomb), coulomb)
+        sliding = _believed(sliding, law)
+        scale = sliding / law if law > 0.0 else 1.0
         coulomb_std = coulomb_std if coulomb_std > std else std
         adapted = ActuatorFriction(
             at_no_speed, coulomb_std, stiction * scale, is_in_range, sliding - at_no_speed, asymmetry * scale
         )
-        return adapted, std, is_pressed or (can_contradict and sliding != found)
+        return adapted, std, is_pressed or contradicts
     missed, doubt = found - law, file_std * file_std + known.friction_std * known.friction_std
     std = _about(abs(outlook.offset), std)
     coulomb_std = _about(abs(sliding - law), coulomb_std)
@@ -629,6 +597,18 @@ def friction_at_rest(
     adapted = ActuatorFriction(coulomb, coulomb_std, stiction, is_in_range, added, asymmetry)
     contradicts = abs(outlook.offset) > 0.5 * (coulomb + stiction) or missed * missed > 4.0 * doubt
     return adapted, std, is_pressed or (can_contradict and contradicts)
+
+
+@compilable
+def _believed(found: float, law: float) -> float:
+    r"""Friction that the estimate uses [N], for what the filter finds and the law of the seal files.
+
+    Of a difference d it takes :math:`d^3 / (d^2 + \varepsilon^2)`, where :math:`\varepsilon` is the smallest deviation
+    that is believed, `LEAST_STD` of the law: so a seal that has not changed keeps the friction of its file.
+    """
+    difference, least = found - law, LEAST_STD * law
+    square = difference * difference
+    return law + difference * square / (square + least * least) if square > 0.0 else law
 
 
 @compilable

@@ -196,12 +196,10 @@ class Reading(NamedTuple):
     force: float  # [N] y
     direction: int  # d
     velocity: float  # [m/s] v
-    way: float  # [m] from the reading before to this one, or to the middle of its stroke
+    way: float  # [m] from the reading before
     friction: float  # [N] f of the law, > 0
     friction_std: float  # [N] of a new reading, by the seal file
     loaded: float = 0.0  # [N] sudden change of the force sum in the rest before: it may be a load
-    std: float = 0.0  # [N] standard deviation of what this reading alone may be off by
-    stroke: float = 0.0  # [m] that it is of; 0.0: it is of one moment
 
 
 @compilable
@@ -307,12 +305,9 @@ def _predicted(
 def _stroke_after(known: FrictionFilter, reading: Reading) -> tuple[float, float, float, float]:
     """`FrictionFilter.stroke`, ``longest``, ``gradient`` and ``strayed`` before a reading is learnt from."""
     stroke, longest, now = abs(reading.way), known.longest, known.terms.gradient
-    if reading.stroke > 0.0:
-        stroke = reading.stroke
     if reading.direction == known.direction:
         strayed = known.strayed + reading.way * (now - known.gradient)
-        stroke = stroke if reading.stroke > 0.0 else known.stroke + stroke
-        return stroke, longest, known.gradient, strayed
+        return known.stroke + stroke, longest, known.gradient, strayed
     return stroke, known.stroke if known.stroke > longest else longest, now, 0.0
 
 
@@ -332,7 +327,6 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
     innovation = reading.force - expected(terms, reading)
     usual = known.unexplained.usual
     noise = known.unexplained.noise * (reading.friction if reading.friction > usual else usual)
-    noise = math.sqrt(noise * noise + reading.std * reading.std) if reading.std > 0.0 else noise
     gains = _gains(covariance, reading)
     spread = expected(gains, reading)
     variance = spread + noise * noise
@@ -356,8 +350,7 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
     terms, covariance = _corrected(terms, covariance, gains, spread, innovation, noise)
 
     untold = terms.gradient * (stroke - longest) if stroke > longest else 0.0
-    # A delay is the same in each stroke, so no number of strokes makes it certain.
-    std = friction_std(covariance, unexplained.drift_square + untold * untold + reading.std * reading.std, reading)
+    std = friction_std(covariance, unexplained.drift_square + untold * untold, reading)
     if outliers.number == 0:
         outliers = Outliers(0, outliers.last, outliers.second, terms)
     return FrictionFilter(
@@ -370,7 +363,7 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
         strayed + terms.offset - offset if longest > SHORTEST_STROKE else 0.0,
         reading.friction,
         std,
-        math.sqrt(variance - reading.std * reading.std),
+        math.sqrt(variance),
         terms,
         covariance,
         unexplained,

@@ -1,0 +1,118 @@
+r"""The moving mass by what accelerations show, and how far a force sum without inertia may be trusted.
+
+Over a stroke from standstill to standstill the acceleration is orthogonal to every friction that is a function of the
+speed, :math:`\int a\,g(v)\,dt = \int g\,dv = 0`, and to a constant load. So it tells the mass from both, however large
+they are. With r the force sum less what friction and load explain, the mass m and the root mean square \sigma of what
+it leaves per acceleration are those of least squares, with a constant of its own for each stroke:
+
+.. math:: m = \frac{\sum \overline{a r}}{\sum \overline{a^2}}, \quad
+          \sigma^2 = \frac{\sum \overline{(r - m a)^2}}{\sum \overline{a^2}}
+
+where the bar is the covariance over the time of a stroke, and the sum fades with the strokes. :math:`\sigma |a|` is not
+the error of a mean, which falls with the number of strokes: what a delay, elastic seals or another mass leave is the
+same in each of them. On real logs it decides whether a sample of an accelerated rod is a reading at all.
+
+Source: least squares by strokes; that functions of the speed alone are orthogonal to the acceleration is the integral
+above. The model and the numbers are our choice.
+"""
+
+import math
+from typing import NamedTuple
+
+from seal_friction_ros.core.foundation.compiled import compilable
+
+MEMORY = 0.8  # [-] of the sums that is left after one more stroke: 0.5 to 0.9 make no difference on random machines
+UNSURE = 0.3  # [-] of the friction: most that the inertia of a reading may be off by; 0.2 to 0.4 differ little
+BEYOND = 3.0  # [-] acceleration over the root mean square of those of the strokes, up to which they show the inertia
+
+
+class Accelerations(NamedTuple):
+    """Sums over the time of the present stroke, by its usable samples."""
+
+    way: float = 0.0  # [m] by all of its samples
+    time: float = 0.0  # [s]
+    acceleration: float = 0.0  # [m/s]
+    square: float = 0.0  # [m^2/s^3] of the acceleration
+    force: float = 0.0  # [N s] that friction and load do not explain
+    inertia: float = 0.0  # [N m/s] of that force times the acceleration
+    force_square: float = 0.0  # [N^2 s]
+
+
+NO_ACCELERATIONS = Accelerations()
+
+
+class MovingMass(NamedTuple):
+    """Covariances over the time of the strokes, faded."""
+
+    time: float = 0.0  # [s]
+    square: float = 0.0  # [m^2/s^3]
+    inertia: float = 0.0  # [N m/s]
+    force_square: float = 0.0  # [N^2 s]
+
+
+NO_MASS = MovingMass()
+
+
+class Inertia(NamedTuple):
+    """Force per acceleration."""
+
+    mass: float  # [kg]
+    std: float  # [kg] root mean square of what it leaves
+    shown: float  # [m/s^2] acceleration up to which the strokes show it
+
+
+@compilable
+def inertia_of(given: float, known: MovingMass) -> Inertia:
+    """Inertia of a ``given`` mass [kg], which is taken as exact, or of the learnt one where that is 0.0."""
+    if given > 0.0:
+        return Inertia(given, 0.0, math.inf)
+    if known.square <= 0.0:
+        return Inertia(0.0, 0.0, -1.0)
+    mass = known.inertia / known.square
+    mass = mass if mass > 0.0 else 0.0  # a negative one is a delay or elastic seals, and stands in the deviation
+    variance = (known.force_square - 2.0 * mass * known.inertia) / known.square + mass * mass
+    std = math.sqrt(variance) if variance > 0.0 else 0.0
+    return Inertia(mass, std, BEYOND * math.sqrt(known.square / known.time))
+
+
+@compilable
+def is_inertia_known(inertia: Inertia, acceleration: float, friction: float) -> bool:
+    """Whether the inertia at an ``acceleration`` [m/s^2] is known well enough beside the ``friction`` [N]."""
+    return abs(acceleration) <= inertia.shown and inertia.std * abs(acceleration) <= UNSURE * friction
+
+
+@compilable
+def force_of_inertia(inertia: Inertia, acceleration: float, friction: float) -> float:
+    """Force to take off a force sum [N]: none where it is not known well enough."""
+    return inertia.mass * acceleration if is_inertia_known(inertia, acceleration, friction) else 0.0
+
+
+@compilable
+def accelerated(sums: Accelerations, acceleration: float, force: float, elapsed: float) -> Accelerations:
+    """Sums after one more sample.
+
+    Args:
+        sums: Of the stroke.
+        acceleration: [m/s^2]
+        force: Force sum less friction and load [N].
+        elapsed: [s] that it stands for.
+    """
+    return Accelerations(
+        sums.way, sums.time + elapsed, sums.acceleration + elapsed * acceleration,
+        sums.square + elapsed * acceleration * acceleration, sums.force + elapsed * force,
+        sums.inertia + elapsed * acceleration * force, sums.force_square + elapsed * force * force,
+    )  # fmt: skip
+
+
+@compilable
+def after_stroke(known: MovingMass, sums: Accelerations) -> MovingMass:
+    """What is known of the mass after a stroke; one without a usable sample tells nothing."""
+    if sums.time == 0.0:
+        return known
+    mean, force = sums.acceleration / sums.time, sums.force / sums.time
+    return MovingMass(
+        MEMORY * known.time + sums.time,
+        MEMORY * known.square + sums.square - mean * sums.acceleration,
+        MEMORY * known.inertia + sums.inertia - mean * sums.force,
+        MEMORY * known.force_square + sums.force_square - force * sums.force,
+    )
