@@ -4,7 +4,6 @@ from typing import Any
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings, AdaptationState, outlook_of
 from seal_friction_ros.core.estimation.estimator import DEFAULT_ADAPTATION
-from seal_friction_ros.core.estimation.moving_mass import inertia_of
 
 
 def learnt_state(
@@ -12,6 +11,5 @@ def learnt_state(
 ) -> AdaptationState:
     """``state`` with ``changes``, and the outlook that belongs to them."""
     state = state._replace(**changes)
-    inertia = inertia_of(settings.moving_mass, state.mass)
-    outlook = outlook_of(settings, inertia, state.filter, state.way, state.acceleration, False)
+    outlook = outlook_of(settings, state.filter, state.way, settings.moving_mass * state.acceleration, False, False)
     return state._replace(outlook=outlook)

@@ -40,10 +40,10 @@ from seal_friction_ros.core.estimation.moving_mass import (
     Inertia,
     MovingMass,
     accelerated,
-    after_stroke,
     force_of_inertia,
     inertia_of,
     is_inertia_known,
+    mass_after,
 )
 from seal_friction_ros.core.foundation.compiled import compilable, replace
 from seal_friction_ros.core.foundation.limits import between
@@ -202,6 +202,7 @@ class AdaptationState(NamedTuple):
     rest: Rest
     outlook: Outlook
     mass: MovingMass
+    since_turn: float  # [m] way since the rod turned or rested
     accelerations: Accelerations  # of the present stroke
 
 
@@ -219,6 +220,7 @@ NOT_ADAPTED = AdaptationState(
     rest=NO_REST,
     outlook=NO_OUTLOOK,
     mass=NO_MASS,
+    since_turn=0.0,
     accelerations=NO_ACCELERATIONS,
 )
 """State before the first sample."""
@@ -270,15 +272,14 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     rest = _rested(settings, state, slide, direction, elapsed)
     known, strokes = state.filter, state.strokes
     speed, fastest = abs(velocity), state.fastest * (1.0 - elapsed / USUAL_TIME)
-    mass, sums = state.mass, state.accelerations
+    mass, since_turn, sums = state.mass, state.since_turn + elapsed * abs(twice.velocity), state.accelerations
     if direction == 0 or state.twice.velocity * twice.velocity <= 0.0:
-        mass, sums = after_stroke(mass, sums), NO_ACCELERATIONS
-    sums = replace(sums, way=sums.way + elapsed * abs(twice.velocity))
+        since_turn, sums = 0.0, NO_ACCELERATIONS
     inertia = inertia_of(settings.moving_mass, mass)
-    is_even = slide.is_usable and direction != 0
-    if is_even:
-        is_even = _is_even(settings, inertia, sums.way, acceleration, at_first, friction)
-    fastest = speed if is_even and speed > fastest else fastest
+    largest = abs(acceleration) if abs(acceleration) > abs(at_first) else abs(at_first)
+    of_inertia = force_of_inertia(inertia, acceleration, friction)
+    is_readable = _is_readable(settings, slide, inertia, since_turn, largest) and direction != 0
+    fastest = speed if is_readable and speed > fastest else fastest
     may_rest = speed < slide.slow <= fastest  # a rod that is never faster could not be learnt from at all
     way = state.way + 0.5 * elapsed * (state.twice.velocity + twice.velocity)
     by_motion, newest_way = state.by_motion, way - state.way
@@ -288,13 +289,12 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
         known, way = by_motion, newest_way
     most = JUMPED if slide.is_identified and not strokes.present.is_identified else math.inf
     is_settled = most * friction >= twice.friction * direction >= SETTLED * friction >= LEAST_FRICTION
-    if is_settled and slide.is_usable and slide.is_identified and sums.way > TURNED:
-        offset = known.terms.offset + way * known.terms.gradient + known.terms.remainder
-        explained = state.outlook.scale * twice.friction + offset
-        sums = accelerated(sums, acceleration, twice.force_sum - explained, elapsed)
-    if is_even and is_settled:
-        force = twice.force_sum - force_of_inertia(inertia, acceleration, friction)
-        law = twice.friction * direction
+    if is_settled and slide.is_usable and slide.is_identified and since_turn > TURNED:
+        at = abs(twice.velocity)
+        mass = mass_after(mass, sums, at)
+        sums = accelerated(sums, at, acceleration, twice.force_sum - twice.friction, elapsed)
+    if is_readable and is_settled:
+        force, law = twice.force_sum - of_inertia, twice.friction * direction
         reading = Reading(slide.stamp, force, direction, twice.velocity, way, law, slide.friction_std, rest.loaded)
         strokes = _with_reading(strokes, reading, slide.is_identified)
         if may_rest and slide.is_identified and known.stamp != NEVER and _is_outlier(state, newest):
@@ -302,34 +302,38 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
         elif slide.is_identified:
             known, way = updated(known, reading), 0.0
             rest = _told(rest) if fastest >= slide.slow else rest
-    outlook = outlook_of(settings, inertia, known, way, acceleration, speed < slide.slow <= fastest)
+    is_uneven = abs(acceleration) > settings.acceleration_max
+    may_have_inertia = is_uneven and not is_inertia_known(inertia, acceleration, friction)
+    outlook = outlook_of(settings, known, way, of_inertia, may_have_inertia, speed < slide.slow <= fastest)
     by_motion = known if fastest >= slide.slow else by_motion
     return AdaptationState(
-        slide.stamp, once, twice, acceleration, way, fastest, known, by_motion, strokes, rest, outlook, mass, sums
+        slide.stamp,
+        once,
+        twice,
+        acceleration,
+        way,
+        fastest,
+        known,
+        by_motion,
+        strokes,
+        rest,
+        outlook,
+        mass,
+        since_turn,
+        sums,
     )
 
 
 @compilable
 def _interrupted(settings: AdaptationSettings, state: AdaptationState, stamp: int, newest: Lagging) -> AdaptationState:
     """State after a gap: signals and strokes begin anew."""
-    known, way, rest = state.filter, state.way, replace(NO_REST, slid=stamp, held=state.rest.held)
+    rest = replace(NO_REST, slid=stamp, held=state.rest.held)
     strokes = Strokes(NO_STROKE, NO_STROKE, state.strokes.ratio, state.strokes.reversals)
-    outlook = outlook_of(settings, inertia_of(settings.moving_mass, state.mass), known, way, 0.0, False)
-    return AdaptationState(
-        stamp,
-        newest,
-        newest,
-        0.0,
-        way,
-        state.fastest,
-        known,
-        state.by_motion,
-        strokes,
-        rest,
-        outlook,
-        state.mass,
-        NO_ACCELERATIONS,
-    )
+    outlook = outlook_of(settings, state.filter, state.way, 0.0, False, False)
+    return replace(
+        state, stamp=stamp, once=newest, twice=newest, acceleration=0.0, strokes=strokes, rest=rest, outlook=outlook,
+        since_turn=0.0, accelerations=NO_ACCELERATIONS,
+    )  # fmt: skip
 
 
 @compilable
@@ -418,55 +422,52 @@ def ratio_of(before: Stroke, after: Stroke) -> float:
 
 
 @compilable
-def _is_even(
-    settings: AdaptationSettings, inertia: Inertia, way: float, acceleration: float, newest: float, friction: float
+def _is_readable(
+    settings: AdaptationSettings, slide: Slide, inertia: Inertia, since_turn: float, acceleration: float
 ) -> bool:
-    """Whether the speed is even: little acceleration, or little inertia against the friction [N] if it is known.
+    """Whether a sample may be a reading: little acceleration, or little inertia against the friction if it is known.
 
     Args:
         settings: With the limits.
+        slide: The sample.
         inertia: Given or learnt.
-        way: Since the rod turned or rested [m]: elastic seals do not slide at once.
-        acceleration: [m/s^2] after two lags, which takes the inertia off.
-        newest: [m/s^2] after one: noisier, but it shows a change earlier.
-        friction: Of the law [N].
+        since_turn: Way [m]: elastic seals do not slide at once.
+        acceleration: [m/s^2] the larger one after one lag, which shows a change earlier, and after two.
     """
-    largest = abs(acceleration) if abs(acceleration) > abs(newest) else abs(newest)
-    is_even = largest <= settings.acceleration_max
-    if is_inertia_known(inertia, largest, friction):
-        return (is_even or way > TURNED) and inertia.mass * largest <= LARGEST_INERTIA * friction
-    return is_even
+    is_even = acceleration <= settings.acceleration_max
+    if is_inertia_known(inertia, acceleration, slide.friction):
+        is_even = (is_even or since_turn > TURNED) and inertia.mass * acceleration <= LARGEST_INERTIA * slide.friction
+    return is_even and slide.is_usable
 
 
 @compilable
 def outlook_of(
     settings: AdaptationSettings,
-    inertia: Inertia,
     known: FrictionFilter,
     way: float,
-    acceleration: float,
+    of_inertia: float,
+    may_have_inertia: bool,
     may_rest: bool,
 ) -> Outlook:
     """What the filter says of the next samples.
 
-    An unknown mass explains less of a stroke that is not even: then only a sample that may have the wrong direction
+    An unknown inertia explains less of a stroke that is not even: then only a sample that may have the wrong direction
     contradicts. Each one does while the rod may be held.
 
     Args:
         settings: With the bounds.
-        inertia: Given or learnt.
         known: The filter.
         way: Of the rod since the last reading [m].
-        acceleration: [m/s^2]
+        of_inertia: Force of a known inertia [N].
+        may_have_inertia: Whether the rod accelerates with an inertia that is not known.
         may_rest: Whether the velocity may be the zero of its sensor: then a smaller innovation contradicts.
     """
-    force = force_of_inertia(inertia, acceleration, known.friction)
     if known.stamp == NEVER:
-        return replace(NO_OUTLOOK, taken_off=force)
+        return replace(NO_OUTLOOK, taken_off=of_inertia)
     friction, terms = known.friction, known.terms
     proven, wavers = known.friction_std <= PROVEN * friction, WAVERING * friction
     most = (OUTLIER if may_rest else IMPLAUSIBLE) * known.innovation_std
-    if abs(acceleration) > settings.acceleration_max and not is_inertia_known(inertia, acceleration, friction):
+    if may_have_inertia:
         wrong_direction = WRONG_DIRECTION * friction
         most = most if most > wrong_direction else wrong_direction
     offset = terms.offset + way * terms.gradient
@@ -475,7 +476,7 @@ def outlook_of(
         proven,
         BITS.MODEL_DISAGREES if known.unexplained.drift_square > wavers * wavers else 0,
         -1.0 if may_be_at_rest else most,
-        force + offset + terms.remainder,
+        of_inertia + offset + terms.remainder,
         offset,
         offset + terms.remainder,
         bounded_friction(settings, known, 0.0, known.speed, friction) / friction,
@@ -528,7 +529,7 @@ def friction_of_sliding(
         if not lowest * coulomb <= at_no_speed <= highest * coulomb:
             at_no_speed = between(lowest * coulomb, at_no_speed, highest * coulomb)
         contradicts = law > 0.0 and sliding != found
-        at_no_speed, sliding = _believed(at_no_speed, coulomb), _believed(sliding, law)
+        at_no_speed, sliding = believed(at_no_speed, coulomb), believed(sliding, law)
         scale = sliding / law if law > 0.0 else 1.0
         stiction, asymmetry = friction.stiction * scale, friction.breakaway_asymmetry * scale
         adapted = ActuatorFriction(
@@ -582,8 +583,8 @@ def friction_at_rest(
     is_pressed, can_contradict = state.rest.pressed > LONGEST_PRESS, outlook.is_proven and law > 0.0
     if uses and outlook.is_proven:
         contradicts = can_contradict and sliding != found
-        at_no_speed = _believed(bounded_friction(settings, known, 0.0, 0.0, coulomb), coulomb)
-        sliding = _believed(sliding, law)
+        at_no_speed = believed(bounded_friction(settings, known, 0.0, 0.0, coulomb), coulomb)
+        sliding = believed(sliding, law)
         scale = sliding / law if law > 0.0 else 1.0
         coulomb_std = coulomb_std if coulomb_std > std else std
         adapted = ActuatorFriction(
@@ -600,11 +601,12 @@ def friction_at_rest(
 
 
 @compilable
-def _believed(found: float, law: float) -> float:
+def believed(found: float, law: float) -> float:
     r"""Friction that the estimate uses [N], for what the filter finds and the law of the seal files.
 
     Of a difference d it takes :math:`d^3 / (d^2 + \varepsilon^2)`, where :math:`\varepsilon` is the smallest deviation
-    that is believed, `LEAST_STD` of the law: so a seal that has not changed keeps the friction of its file.
+    that is believed, `LEAST_STD` of the law: half of it there, less below, so a seal that has not changed keeps the
+    friction of its file.
     """
     difference, least = found - law, LEAST_STD * law
     square = difference * difference

@@ -30,7 +30,6 @@ from seal_friction_ros.core.estimation.conditioned_velocity import (
     condition_velocity,
 )
 from seal_friction_ros.core.estimation.hidden_motion import NO_HIDDEN_MOTION, Apparent, HiddenMotion, with_sample
-from seal_friction_ros.core.estimation.moving_mass import inertia_of, is_inertia_known
 from seal_friction_ros.core.estimation.records import RodSample, SealTemperature
 from seal_friction_ros.core.estimation.sheared_seals import (
     NOT_FOLLOWED,
@@ -572,14 +571,13 @@ def _moment_of_seals(
     estimate: FrictionEstimate,
 ) -> Moment:
     """A sample as seals that shear take it, less what is known not to be friction."""
-    inertia, coulomb = inertia_of(settings.moving_mass, known.mass), friction.coulomb_friction
-    force, is_known = inertia.mass * known.acceleration, is_inertia_known(inertia, known.acceleration, coulomb)
+    inertia, coulomb = settings.moving_mass * known.acceleration, friction.coulomb_friction
+    is_small = abs(inertia) <= LARGEST_INERTIA * coulomb
     return Moment(
         stamp=seen.stamp, velocity=measured, direction=sign(seen.velocity),
-        force_sum=seen.force_sum - estimate.adaptation_offset - force,
+        force_sum=seen.force_sum - estimate.adaptation_offset - inertia,
         knows_force_sum=not estimate.status & _NO_FORCE_SUM,
-        knows_inertia=is_known and abs(force) <= LARGEST_INERTIA * coulomb and known.stamp != NEVER,
-        coulomb_friction=coulomb,
+        knows_inertia=settings.moving_mass > 0.0 and is_small and known.stamp != NEVER, coulomb_friction=coulomb,
         velocity_friction=friction.velocity_friction, stiction=estimate.breakaway_force - coulomb,
     )  # fmt: skip
 

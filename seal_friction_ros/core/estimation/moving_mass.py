@@ -1,19 +1,20 @@
 r"""The moving mass by what accelerations show, and how far a force sum without inertia may be trusted.
 
-Over a stroke from standstill to standstill the acceleration is orthogonal to every friction that is a function of the
-speed, :math:`\int a\,g(v)\,dt = \int g\,dv = 0`, and to a constant load. So it tells the mass from both, however large
-they are. With r the force sum less what friction and load explain, the mass m and the root mean square \sigma of what
-it leaves per acceleration are those of least squares, with a constant of its own for each stroke:
+Over a part of a stroke that ends as fast as it began the acceleration is orthogonal to every friction that is a
+function g of the speed, :math:`\int a\,g(v)\,dt = \int g\,dv = 0`, and to a constant load. So it tells the mass from
+both, however large they are. With r the force sum less the friction of the law, the mass m and the root mean square
+:math:`\sigma` of what it leaves per acceleration are those of least squares, with a constant of its own for each part:
 
 .. math:: m = \frac{\sum \overline{a r}}{\sum \overline{a^2}}, \quad
           \sigma^2 = \frac{\sum \overline{(r - m a)^2}}{\sum \overline{a^2}}
 
-where the bar is the covariance over the time of a stroke, and the sum fades with the strokes. :math:`\sigma |a|` is not
-the error of a mean, which falls with the number of strokes: what a delay, elastic seals or another mass leave is the
-same in each of them. On real logs it decides whether a sample of an accelerated rod is a reading at all.
+where the bar is the integral over the time of a part, of deviations from its means, and the sum fades from part to
+part. :math:`\sigma |a|` is not the error of a mean, which falls with the number of strokes: what a delay, elastic seals
+or friction of the position leave is the same in each of them. On real logs it decides whether a sample of an
+accelerated rod is a reading at all. A load over the position counts as a mass where strokes are alike: both are no
+friction. Nothing of the filter comes in, so its errors cannot feed themselves.
 
-Source: least squares by strokes; that functions of the speed alone are orthogonal to the acceleration is the integral
-above. The model and the numbers are our choice.
+Source: least squares by parts of strokes; the orthogonality is the integral above. Model and numbers are our choice.
 """
 
 import math
@@ -21,19 +22,20 @@ from typing import NamedTuple
 
 from seal_friction_ros.core.foundation.compiled import compilable
 
-MEMORY = 0.8  # [-] of the sums that is left after one more stroke: 0.5 to 0.9 make no difference on random machines
+MEMORY = 0.8  # [-] of the sums that is left after one more part: 0.5 to 0.9 make no difference on random machines
+SHORTEST = 0.05  # [s] of a part of a stroke that tells: fewer samples fit any mass
 UNSURE = 0.3  # [-] of the friction: most that the inertia of a reading may be off by; 0.2 to 0.4 differ little
 BEYOND = 3.0  # [-] acceleration over the root mean square of those of the strokes, up to which they show the inertia
 
 
 class Accelerations(NamedTuple):
-    """Sums over the time of the present stroke, by its usable samples."""
+    """Sums over the time of a part of a stroke that ends as fast as it begins."""
 
-    way: float = 0.0  # [m] by all of its samples
+    speed: float = 0.0  # [m/s] of its first sample
     time: float = 0.0  # [s]
     acceleration: float = 0.0  # [m/s]
     square: float = 0.0  # [m^2/s^3] of the acceleration
-    force: float = 0.0  # [N s] that friction and load do not explain
+    force: float = 0.0  # [N s] that the law does not explain
     inertia: float = 0.0  # [N m/s] of that force times the acceleration
     force_square: float = 0.0  # [N^2 s]
 
@@ -42,7 +44,7 @@ NO_ACCELERATIONS = Accelerations()
 
 
 class MovingMass(NamedTuple):
-    """Covariances over the time of the strokes, faded."""
+    """Integrals of deviations from the means of the parts of strokes, faded."""
 
     time: float = 0.0  # [s]
     square: float = 0.0  # [m^2/s^3]
@@ -88,26 +90,29 @@ def force_of_inertia(inertia: Inertia, acceleration: float, friction: float) -> 
 
 
 @compilable
-def accelerated(sums: Accelerations, acceleration: float, force: float, elapsed: float) -> Accelerations:
-    """Sums after one more sample.
+def accelerated(sums: Accelerations, speed: float, acceleration: float, force: float, elapsed: float) -> Accelerations:
+    """Sums after one more sample; one that is slower than the first begins anew.
 
     Args:
-        sums: Of the stroke.
+        sums: Of the part of the stroke so far.
+        speed: [m/s]
         acceleration: [m/s^2]
-        force: Force sum less friction and load [N].
-        elapsed: [s] that it stands for.
+        force: Force sum less the friction of the law [N].
+        elapsed: [s] that the sample stands for.
     """
+    if sums.time == 0.0 or speed < sums.speed:
+        sums = Accelerations(speed, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     return Accelerations(
-        sums.way, sums.time + elapsed, sums.acceleration + elapsed * acceleration,
+        sums.speed, sums.time + elapsed, sums.acceleration + elapsed * acceleration,
         sums.square + elapsed * acceleration * acceleration, sums.force + elapsed * force,
         sums.inertia + elapsed * acceleration * force, sums.force_square + elapsed * force * force,
     )  # fmt: skip
 
 
 @compilable
-def after_stroke(known: MovingMass, sums: Accelerations) -> MovingMass:
-    """What is known of the mass after a stroke; one without a usable sample tells nothing."""
-    if sums.time == 0.0:
+def mass_after(known: MovingMass, sums: Accelerations, speed: float) -> MovingMass:
+    """What is known of the mass once the rod is slower than at the beginning of that part of its stroke."""
+    if speed >= sums.speed or sums.time < SHORTEST:
         return known
     mean, force = sums.acceleration / sums.time, sums.force / sums.time
     return MovingMass(

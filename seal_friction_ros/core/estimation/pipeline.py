@@ -29,7 +29,7 @@ from operator import attrgetter
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation import estimator
-from seal_friction_ros.core.estimation.adaptation import AdaptationState, bounded_friction
+from seal_friction_ros.core.estimation.adaptation import AdaptationState, believed, bounded_friction
 from seal_friction_ros.core.estimation.conditioned_velocity import (
     NOT_CONDITIONED,
     SETTLING,
@@ -434,7 +434,8 @@ def _friction_at(parameters: Any, known: Any, temperature: SealTemperature, coul
         return friction if friction > 0.0 else 0.0
     direction = (1.0 if velocity > 0.0 else -1.0) if velocity != 0.0 else 0.0
     sliding = law.coulomb_friction + law.velocity_friction
-    return bounded_friction(parameters.adaptation, known.adaptation.filter, direction, abs(velocity), sliding)
+    found = bounded_friction(parameters.adaptation, known.adaptation.filter, direction, abs(velocity), sliding)
+    return believed(found, sliding)
 
 
 @compilable

@@ -9,6 +9,7 @@ from seal_friction_ros.core.foundation.units import BAR, ZEROS
 from seal_friction_ros.core.identification import diagnostics
 from seal_friction_ros.core.identification.admission import together
 from seal_friction_ros.core.identification.breakaway import BreakawayFit
+from seal_friction_ros.core.identification.candidate_laws import FittedParameter
 from seal_friction_ros.core.identification.force_correction import ForceCorrection
 from seal_friction_ros.core.identification.readings import has_pressures
 from seal_friction_ros.core.identification.run_in import SettledLaw
@@ -233,10 +234,15 @@ def _dwell_text(law: BreakawayFit) -> str:
     )
 
 
+def _valued(parameter: FittedParameter, value: float) -> str:
+    unit = '' if parameter.unit == '1' else f' {parameter.unit}'
+    return f'{parameter.name} = {value:.4g}{unit}'
+
+
 def _settled_text(settled: SettledLaw, selection: LawSelection) -> str:
     at = settled.readings.at
     change = float(settled.fit.friction(at).mean() / selection.fit.friction(at).mean()) - 1.0
-    values = ', '.join(f'{p.name} = {selection.fit.values[p.name]:.4g} {p.unit}' for p in selection.law.parameters)
+    values = ', '.join(_valued(p, selection.fit.values[p.name]) for p in selection.law.parameters)
     return (
         f'run-in: the friction drifts over the runs beyond the scatter of the strokes; the seal file holds the law of '
         f'the settled seal, {100.0 * change:+.0f} % against the readings, with a standard deviation of '
@@ -305,7 +311,7 @@ def summary(found: Identification) -> str:
     for p in selection.law.parameters:
         also = ''.join(f' ({first}; {other.values[p.name]:.4g} {name})' for name, other in others)
         error = quality.standard_errors[p.name]
-        lines.append(f'  {p.name} = {fit.values[p.name]:.4g} {p.unit}, standard error {error:.2g}{also}')
+        lines.append(f'  {_valued(p, fit.values[p.name])}, standard error {error:.2g}{also}')
     lines += ['  pressure [bar]  measured [N]  fitted [N]  std [N]']
     for level in found.levels:
         numbers = f'{level.pressure / BAR:14.4g}  {level.measured:12.4g}  {level.fitted:10.4g}  {level.std:7.4g}'

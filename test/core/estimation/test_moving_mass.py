@@ -10,24 +10,29 @@ from seal_friction_ros.core.estimation.moving_mass import (
     NO_MASS,
     Accelerations,
     accelerated,
-    after_stroke,
     force_of_inertia,
     inertia_of,
     is_inertia_known,
+    mass_after,
 )
 
 RATE = 2.0 * math.pi * 2.0  # [1/s]
 STEPS = 1000  # of a stroke of a sine from turn to turn
 
 
-def stroke(force, side=1.0) -> Accelerations:
-    """A stroke of a sine; ``force`` [N] by velocity [m/s] and acceleration [m/s^2]."""
+def stroke(force, side=1.0, after=0.1) -> Accelerations:
+    """A stroke of a sine from 0.1 of its way on; ``force`` [N] by velocity [m/s] and acceleration [m/s^2]."""
     sums, period = NO_ACCELERATIONS, math.pi / RATE / STEPS
-    for i in range(STEPS):
+    for i in range(round(after * STEPS), round((1.0 - after) * STEPS)):
         phase = math.pi * (i + 0.5) / STEPS
         velocity, acceleration = side * 0.1 * math.sin(phase), side * 0.1 * RATE * math.cos(phase)
-        sums = accelerated(sums, acceleration, force(velocity, acceleration), period)
+        sums = accelerated(sums, abs(velocity), acceleration, force(velocity, acceleration), period)
     return sums
+
+
+def after_stroke(known, sums):
+    """The mass once the rod is slower than in the part of the stroke."""
+    return mass_after(known, sums, 0.0)
 
 
 @pytest.mark.parametrize('mass', [0.0, 5.0, 80.0])
@@ -49,7 +54,7 @@ def test_over_a_stroke_friction_that_is_a_function_of_the_speed_shows_no_mass(fr
 
 
 def test_an_inertia_without_anything_else_leaves_nothing():
-    inertia = inertia_of(0.0, after_stroke(NO_MASS, stroke(lambda _, a: 20.0 * a)))
+    inertia = inertia_of(0.0, after_stroke(NO_MASS, stroke(lambda _, a: 20.0 * a, after=0.0)))
     assert inertia.mass == pytest.approx(20.0)
     assert inertia.std == pytest.approx(0.0, abs=1e-6)
     assert inertia.shown == pytest.approx(BEYOND * 0.1 * RATE / math.sqrt(2.0), rel=1e-3)
@@ -92,6 +97,22 @@ def test_before_a_stroke_and_beyond_the_accelerations_of_the_strokes_nothing_is_
     inertia = inertia_of(0.0, after_stroke(NO_MASS, stroke(lambda _, a: 0.0 * a)))
     assert is_inertia_known(inertia, inertia.shown, 40.0)
     assert not is_inertia_known(inertia, 1.01 * inertia.shown, 40.0)
-    assert not is_inertia_known(
-        inertia_of(0.0, after_stroke(NO_MASS, accelerated(NO_ACCELERATIONS, 0.3, 9.0, 0.01))), 0.01, 40.0
-    )
+
+
+def test_a_part_that_began_at_a_speed_tells_nothing_until_the_rod_is_slower_again():
+    """After a gap, or where a stroke is cut."""
+    sums = stroke(lambda v, a: 300.0 * v + 5.0 * a, after=0.3)
+    assert mass_after(NO_MASS, sums, 0.1) == NO_MASS
+    assert inertia_of(0.0, after_stroke(NO_MASS, sums)).mass == pytest.approx(5.0, abs=1e-6)
+
+
+def test_a_slower_sample_begins_anew():
+    sums = accelerated(stroke(lambda v, a: 300.0 * v + 5.0 * a, after=0.3), 0.01, -0.5, 9.0, 0.001)
+    assert sums == accelerated(NO_ACCELERATIONS, 0.01, -0.5, 9.0, 0.001)
+
+
+def test_a_few_samples_fit_any_mass_and_tell_nothing():
+    sums = NO_ACCELERATIONS
+    for acceleration, force in ((0.1, 5.0), (-0.1, -5.0)):
+        sums = accelerated(sums, 0.1, acceleration, force, 0.01)
+    assert after_stroke(NO_MASS, sums) == NO_MASS

@@ -1,5 +1,7 @@
 """Logs of a seal that runs in: the seal file holds the settled seal, the numbers beside it the readings as measured."""
 
+import re
+
 import numpy as np
 import pytest
 from harness.identify_run import Run, delft, estimates_of
@@ -151,3 +153,9 @@ def test_delft_two_days_of_one_ring_agree_better_once_settled(tmp_path):
         return np.sqrt(np.mean(np.log(one / other) ** 2))
 
     assert apart([day.figures['settled'] for day in days]) < 0.9 * apart([day.figures for day in days])
+
+
+def test_a_number_without_unit_is_shown_without_one(tmp_path, capsys):
+    arguments = logs(tmp_path, lambda s, _: 1.0 + 0.0 * s)
+    assert main(['identify', *arguments, '--law', 'all_terms', '--out', str(tmp_path / 'seal.yaml')]) == 0
+    assert re.search(r'pressure_exponent = [\d.]+, standard error', capsys.readouterr().out)
