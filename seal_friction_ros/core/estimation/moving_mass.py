@@ -8,11 +8,12 @@ both, however large they are. With r the force sum less the friction of the law,
 .. math:: m = \frac{\sum \overline{a r}}{\sum \overline{a^2}}, \quad
           \sigma^2 = \frac{\sum \overline{(r - m a)^2}}{\sum \overline{a^2}}
 
-where the bar is the integral over the time of a part, of deviations from its means, and the sum fades from part to
-part. :math:`\sigma |a|` is not the error of a mean, which falls with the number of strokes: what a delay, elastic seals
-or friction of the position leave is the same in each of them. On real logs it decides whether a sample of an
-accelerated rod is a reading at all. A load over the position counts as a mass where strokes are alike: both are no
-friction. Nothing of the filter comes in, so its errors cannot feed themselves.
+where the bar is the integral over the time of a part, of deviations from its means; the sum fades from part to part,
+and weighs each by its mean square acceleration: what a slow stroke leaves says little of the inertia of a fast one.
+:math:`\sigma |a|` is not the error of a mean, which falls with the number of strokes: what a delay, elastic seals or
+friction of the position leave is the same in each of them. On real logs it decides whether a sample of an accelerated
+rod is a reading at all. A load over the position counts as a mass where strokes are alike: both are no friction.
+Nothing of the filter comes in, so its errors cannot feed themselves.
 
 Source: least squares by parts of strokes; the orthogonality is the integral above. Model and numbers are our choice.
 """
@@ -44,12 +45,12 @@ NO_ACCELERATIONS = Accelerations()
 
 
 class MovingMass(NamedTuple):
-    """Integrals of deviations from the means of the parts of strokes, faded."""
+    """Integrals of deviations from the means of the parts of strokes, faded, each times its weight [m^2/s^4]."""
 
-    time: float = 0.0  # [s]
-    square: float = 0.0  # [m^2/s^3]
-    inertia: float = 0.0  # [N m/s]
-    force_square: float = 0.0  # [N^2 s]
+    time: float = 0.0  # [m^2/s^3]
+    square: float = 0.0  # [m^4/s^7]
+    inertia: float = 0.0  # [N m^3/s^5]
+    force_square: float = 0.0  # [N^2 m^2/s^3]
 
 
 NO_MASS = MovingMass()
@@ -115,9 +116,11 @@ def mass_after(known: MovingMass, sums: Accelerations, speed: float) -> MovingMa
     if speed >= sums.speed or sums.time < SHORTEST:
         return known
     mean, force = sums.acceleration / sums.time, sums.force / sums.time
+    square = sums.square - mean * sums.acceleration
+    weight = square / sums.time
     return MovingMass(
-        MEMORY * known.time + sums.time,
-        MEMORY * known.square + sums.square - mean * sums.acceleration,
-        MEMORY * known.inertia + sums.inertia - mean * sums.force,
-        MEMORY * known.force_square + sums.force_square - force * sums.force,
+        MEMORY * known.time + weight * sums.time,
+        MEMORY * known.square + weight * square,
+        MEMORY * known.inertia + weight * (sums.inertia - mean * sums.force),
+        MEMORY * known.force_square + weight * (sums.force_square - force * sums.force),
     )

@@ -116,3 +116,13 @@ def test_a_few_samples_fit_any_mass_and_tell_nothing():
     for acceleration, force in ((0.1, 5.0), (-0.1, -5.0)):
         sums = accelerated(sums, 0.1, acceleration, force, 0.01)
     assert after_stroke(NO_MASS, sums) == NO_MASS
+
+
+def test_a_slow_stroke_says_little_of_the_inertia_of_a_fast_one():
+    """It weighs as the fourth power of its acceleration: so friction that drifts over it leaves the mass alone."""
+    fast, slow = stroke(lambda _, a: 20.0 * a), NO_ACCELERATIONS
+    for i in range(1000):
+        slow = accelerated(slow, 0.01, 0.02 * math.cos(math.pi * (i + 0.5) / 1000), 0.01 * (500 - i), 0.001)
+    inertia = inertia_of(0.0, after_stroke(after_stroke(NO_MASS, fast), slow))
+    assert inertia.mass == pytest.approx(20.0, rel=0.01)
+    assert inertia.std < 2.0
