@@ -82,7 +82,7 @@ def test_off_stays_off_whoever_sets_a_scale_and_whoever_comes_back_with_one_unti
         page.wait_for('now && !now.cause && columns.feedforward.slice(-50).some((force) => force > 20)')
         press_off(page)
         assert page.value('byId("off-events").children.length') == 0
-        page.wait_for('off.lines[0]?.[1]?.endsWith("feedforward.scale = 0")')
+        page.wait_for('off?.lines[0]?.[1]?.endsWith("feedforward.scale = 0")')
 
         set_scale(domain, '/friction_estimator', 'feedforward.scale', 0.5)
         page.wait_for(

@@ -1,8 +1,8 @@
 """Status 0 under attack: a rod on strokes and rests with exact rigid friction, and what sensors and loads do to it.
 
-``python test/system/attacks.py [--random 100]``. Wrong is a sample with status 0 whose friction force is outside the
-95 % band; the first 2 s do not count. Exit code 1 if more than 0.5 % of the samples with status 0 of an attack are
-wrong, or fewer than 80 % of the samples of a clean machine have status 0.
+``python test/system/attacks.py [--mass 0 | --random 100]``. Wrong is a sample with status 0 whose friction force is
+outside the 95 % band; the first 2 s do not count. Exit code 1 if more than 0.5 % of the samples with status 0 of an
+attack are wrong, or fewer than 80 % of the samples of a clean machine have status 0.
 
 ``--random`` instead draws so many machines, each by its number: mass, known or not, strokes or sines, and one to three
 attacks at once (of two that change the velocity the later one counts). Exit code 1 if more than 0.5 % of all samples
@@ -261,9 +261,9 @@ class Found(NamedTuple):
     wrong: float  # of these, outside the band
 
 
-def attacked(name: str, mode: str, seconds: float) -> Found:
-    """Run one attack."""
-    return estimated(Machine((CLEAN | ATTACKS)[name](strokes(seconds))), mode)
+def attacked(name: str, mode: str, seconds: float, mass: float = MASS) -> Found:
+    """Run one attack; the estimator knows a ``mass`` [kg], or none where it is 0.0."""
+    return estimated(Machine((CLEAN | ATTACKS)[name](strokes(seconds)), mass), mode)
 
 
 def estimated(machine: Machine, mode: str) -> Found:
@@ -286,12 +286,16 @@ def estimated(machine: Machine, mode: str) -> Found:
 def main() -> int:
     """Run all; print the table, or JSON."""
     parser = parser_of(
-        __doc__, seconds=(40.0, 'of an attack [s]'), workers=(2, 'processes'), random=(0, 'machines instead')
+        __doc__,
+        seconds=(40.0, 'of an attack [s]'),
+        workers=(2, 'processes'),
+        random=(0, 'machines instead'),
+        mass=(MASS, 'that the estimator knows; 0: unknown [kg]'),
     )
     arguments = parser.parse_args()
     cases = [(name, mode) for name in range(arguments.random) or CLEAN | ATTACKS for mode in ('observe', 'on')]
     with ProcessPoolExecutor(arguments.workers) as pool:
-        found = list(pool.map(partial(_attacked, arguments.seconds), cases))
+        found = list(pool.map(partial(_attacked, arguments.seconds, arguments.mass), cases))
     rows = [{'case': said, 'mode': mode, **one._asdict()} for (_, mode), (said, one) in zip(cases, found, strict=True)]
     if arguments.random:
         good, wrong = np.mean([(one.good, one.good * one.wrong) for _, one in found], axis=0).tolist()
@@ -304,11 +308,11 @@ def main() -> int:
     return int(fails or any(one.good < 0.8 for name, one in found if name in CLEAN))
 
 
-def _attacked(seconds: float, case: tuple[str | int, str]) -> tuple[str, Found]:
+def _attacked(seconds: float, mass: float, case: tuple[str | int, str]) -> tuple[str, Found]:
     """What was done, and what was found."""
     name, mode = case
     if isinstance(name, str):
-        return name, attacked(name, mode, seconds)
+        return name, attacked(name, mode, seconds, mass)
     machine = random_machine(name, seconds)
     return machine.name, estimated(machine, mode)
 

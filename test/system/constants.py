@@ -21,9 +21,9 @@ from attacks import ATTACKS, CLEAN, attacked
 from compare_estimators import Log, package, seals_and_logs
 from harness.campaign import parser_of, tell
 
-from seal_friction_ros.core.estimation import adaptation, friction_filter
+from seal_friction_ros.core.estimation import adaptation, friction_filter, moving_mass
 
-MODULES = (friction_filter, adaptation)
+MODULES = (friction_filter, moving_mass, adaptation)
 LEAST = 0.002  # [-] change that is told
 Pairs = Mapping[str, tuple[Path, Log]]
 
@@ -49,7 +49,7 @@ def figures(seconds: float, pairs: Pairs) -> dict[str, float]:
     """Errors on logs, shares of good and of wrong samples of the attacks."""
     found = {f'{name}: {key}': value for name, of in pairs.items() for key, value in package(*of)[0].items()}
     for name in CLEAN | ATTACKS:
-        one = attacked(name, 'on', seconds)
+        one = attacked(name, 'on', seconds, 0.0)
         found |= {f'{name}: good': one.good, f'{name}: wrong': 1.0 + one.wrong}
     return found
 

@@ -39,11 +39,9 @@ from seal_friction_ros.core.estimation.moving_mass import (
     Accelerations,
     Inertia,
     MovingMass,
-    accelerated,
-    force_of_inertia,
+    followed,
     inertia_of,
     is_inertia_known,
-    mass_after,
 )
 from seal_friction_ros.core.foundation.compiled import compilable, replace
 from seal_friction_ros.core.foundation.limits import between
@@ -272,12 +270,13 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     rest = _rested(settings, state, slide, direction, elapsed)
     known, strokes = state.filter, state.strokes
     speed, fastest = abs(velocity), state.fastest * (1.0 - elapsed / USUAL_TIME)
-    mass, since_turn, sums = state.mass, state.since_turn + elapsed * abs(twice.velocity), state.accelerations
-    if direction == 0 or state.twice.velocity * twice.velocity <= 0.0:
-        since_turn, sums = 0.0, NO_ACCELERATIONS
+    has_turned = direction == 0 or state.twice.velocity * twice.velocity <= 0.0
+    since_turn = 0.0 if has_turned else state.since_turn + elapsed * abs(twice.velocity)
+    mass, sums = state.mass, NO_ACCELERATIONS if has_turned else state.accelerations
     inertia = inertia_of(settings.moving_mass, mass)
+    knows_inertia = is_inertia_known(inertia, acceleration, friction)
+    of_inertia = inertia.mass * acceleration if knows_inertia else 0.0
     largest = abs(acceleration) if abs(acceleration) > abs(at_first) else abs(at_first)
-    of_inertia = force_of_inertia(inertia, acceleration, friction)
     is_readable = _is_readable(settings, slide, inertia, since_turn, largest) and direction != 0
     fastest = speed if is_readable and speed > fastest else fastest
     may_rest = speed < slide.slow <= fastest  # a rod that is never faster could not be learnt from at all
@@ -290,9 +289,8 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     most = JUMPED if slide.is_identified and not strokes.present.is_identified else math.inf
     is_settled = most * friction >= twice.friction * direction >= SETTLED * friction >= LEAST_FRICTION
     if is_settled and slide.is_usable and slide.is_identified and since_turn > TURNED:
-        at = abs(twice.velocity)
-        mass = mass_after(mass, sums, at)
-        sums = accelerated(sums, at, acceleration, twice.force_sum - twice.friction, elapsed)
+        unexplained = twice.force_sum - twice.friction
+        mass, sums = followed(mass, sums, abs(twice.velocity), acceleration, unexplained, elapsed)
     if is_readable and is_settled:
         force, law = twice.force_sum - of_inertia, twice.friction * direction
         reading = Reading(slide.stamp, force, direction, twice.velocity, way, law, slide.friction_std, rest.loaded)
@@ -302,26 +300,13 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
         elif slide.is_identified:
             known, way = updated(known, reading), 0.0
             rest = _told(rest) if fastest >= slide.slow else rest
-    is_uneven = abs(acceleration) > settings.acceleration_max
-    may_have_inertia = is_uneven and not is_inertia_known(inertia, acceleration, friction)
+    may_have_inertia = not knows_inertia and abs(acceleration) > settings.acceleration_max
     outlook = outlook_of(settings, known, way, of_inertia, may_have_inertia, speed < slide.slow <= fastest)
     by_motion = known if fastest >= slide.slow else by_motion
     return AdaptationState(
-        slide.stamp,
-        once,
-        twice,
-        acceleration,
-        way,
-        fastest,
-        known,
-        by_motion,
-        strokes,
-        rest,
-        outlook,
-        mass,
-        since_turn,
-        sums,
-    )
+        slide.stamp, once, twice, acceleration, way, fastest, known, by_motion, strokes, rest, outlook, mass,
+        since_turn, sums,
+    )  # fmt: skip
 
 
 @compilable

@@ -23,10 +23,10 @@ from typing import NamedTuple
 
 from seal_friction_ros.core.foundation.compiled import compilable
 
-MEMORY = 0.8  # [-] of the sums that is left after one more part: 0.5 to 0.9 make no difference on random machines
-SHORTEST = 0.05  # [s] of a part of a stroke that tells: fewer samples fit any mass
-UNSURE = 0.3  # [-] of the friction: most that the inertia of a reading may be off by; 0.2 to 0.4 differ little
-BEYOND = 3.0  # [-] acceleration over the root mean square of those of the strokes, up to which they show the inertia
+MEMORY = 0.8  # [-] of the sums that is left after one more part (0.5: twice as many samples of machines are wrong)
+SHORTEST = 0.05  # [s] of a part of a stroke that tells: fewer samples fit any mass (0: twice as many wrong ones)
+UNSURE = 0.3  # [-] of the friction: most that the inertia of a reading may be off by (0.4: 93 % of a log are good)
+BEYOND = 3.0  # [-] acceleration over the root mean square of those of the strokes, up to which they show it
 
 
 class Accelerations(NamedTuple):
@@ -85,12 +85,6 @@ def is_inertia_known(inertia: Inertia, acceleration: float, friction: float) -> 
 
 
 @compilable
-def force_of_inertia(inertia: Inertia, acceleration: float, friction: float) -> float:
-    """Force to take off a force sum [N]: none where it is not known well enough."""
-    return inertia.mass * acceleration if is_inertia_known(inertia, acceleration, friction) else 0.0
-
-
-@compilable
 def accelerated(sums: Accelerations, speed: float, acceleration: float, force: float, elapsed: float) -> Accelerations:
     """Sums after one more sample; one that is slower than the first begins anew.
 
@@ -118,9 +112,19 @@ def mass_after(known: MovingMass, sums: Accelerations, speed: float) -> MovingMa
     mean, force = sums.acceleration / sums.time, sums.force / sums.time
     square = sums.square - mean * sums.acceleration
     weight = square / sums.time
+    if weight <= 0.0:  # an even motion shows no mass, and forgets none
+        return known
     return MovingMass(
         MEMORY * known.time + weight * sums.time,
         MEMORY * known.square + weight * square,
         MEMORY * known.inertia + weight * (sums.inertia - mean * sums.force),
         MEMORY * known.force_square + weight * (sums.force_square - force * sums.force),
     )
+
+
+@compilable
+def followed(
+    known: MovingMass, sums: Accelerations, speed: float, acceleration: float, force: float, elapsed: float
+) -> tuple[MovingMass, Accelerations]:
+    """What is known of the mass, and the part of the stroke, after one more sample of a sliding rod (`accelerated`)."""
+    return mass_after(known, sums, speed), accelerated(sums, speed, acceleration, force, elapsed)

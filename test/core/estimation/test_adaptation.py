@@ -139,13 +139,12 @@ def test_off_every_number_is_that_of_the_file_and_nothing_is_learnt():
 
 @pytest.mark.parametrize('mode', ['observe', 'on'])
 def test_the_residual_is_what_friction_offset_and_inertia_leave_of_the_force_sum(mode):
-    known, seen = parameters(mode), 0
+    known, seen = replace(parameters(mode), adaptation=AdaptationSettings(mode, moving_mass=7.0)), 0
     state = estimator.init(known)
     for sample in samples(replace(DAY, scale=lambda _: 1.4), 8.0, 1):
-        outlook = state.adaptation.outlook
+        inertia = 7.0 * state.adaptation.acceleration
         state, estimate = step(known, state, sample)
         if estimate.state == SLIDING:
-            inertia = outlook.taken_off - outlook.unsteady_offset
             left = sample.force.force - estimate.friction_force - estimate.adaptation_offset - inertia
             assert estimate.residual == pytest.approx(left, abs=1e-9)
             seen += 1
@@ -252,12 +251,14 @@ def test_strokes_that_are_never_even_tell_friction_offset_and_mass(mass, rel):
     [lambda v: 40.0 + 300.0 * v, lambda v: 40.0 + 30.0 * math.exp(-((v / 0.01) ** 2))],
     ids=['viscous', 'Stribeck'],
 )
-@pytest.mark.parametrize('gap', [0, SECOND // 7], ids=['', 'gaps'])
-def test_friction_of_the_speed_is_no_mass_and_a_gap_within_a_stroke_makes_none(friction, gap):
-    slides = [
-        slide._replace(stamp=slide.stamp + gap * (i // 41))  # the period is 0.8 s, so gaps come at any part of a stroke
-        for i, slide in enumerate(swinging(20.0, 20.0, friction=friction))
-    ]
+@pytest.mark.parametrize('cut', ['', 'gap', 'fault', 'rest'])
+def test_friction_of_the_speed_is_no_mass_and_a_stroke_that_is_cut_makes_none(friction, cut):
+    """The period is 0.8 s, so the cuts come at any part of a stroke."""
+    slides = []
+    for i, slide in enumerate(swinging(20.0, 20.0, friction=friction)):
+        is_cut, late = i % 41 < 4, SECOND // 7 * (i // 41) if cut == 'gap' else 0
+        usable, velocity = not (is_cut and cut == 'fault'), 0.0 if is_cut and cut == 'rest' else slide.velocity
+        slides.append(slide._replace(stamp=slide.stamp + late, is_usable=usable, velocity=velocity))
     state = adapted(slides, NEVER_EVEN)
     assert inertia_of(0.0, state.mass).mass == pytest.approx(20.0, rel=0.05)
     speed = state.filter.speed
