@@ -286,14 +286,15 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
         by_motion = _moved(by_motion, newest_way if state.fastest < slide.slow else way)
     elif state.fastest < slide.slow:  # the slow motion before may have been the zero of its sensor
         known, way = by_motion, newest_way
+    meant = _between(state.twice, twice) if abs(acceleration) > settings.acceleration_max else twice
     most = JUMPED if slide.is_identified and not strokes.present.is_identified else math.inf
     is_settled = most * friction >= twice.friction * direction >= SETTLED * friction >= LEAST_FRICTION
     if is_settled and slide.is_usable and slide.is_identified and since_turn > TURNED:
-        unexplained = twice.force_sum - twice.friction
-        mass, sums = followed(mass, sums, abs(twice.velocity), acceleration, unexplained, elapsed)
+        unexplained = meant.force_sum - meant.friction
+        mass, sums = followed(mass, sums, abs(meant.velocity), acceleration, unexplained, elapsed)
     if is_readable and is_settled:
-        force, law = twice.force_sum - of_inertia, twice.friction * direction
-        reading = Reading(slide.stamp, force, direction, twice.velocity, way, law, slide.friction_std, rest.loaded)
+        force, law = meant.force_sum - of_inertia, meant.friction * direction
+        reading = Reading(slide.stamp, force, direction, meant.velocity, way, law, slide.friction_std, rest.loaded)
         strokes = _with_reading(strokes, reading, slide.is_identified)
         if may_rest and slide.is_identified and known.stamp != NEVER and _is_outlier(state, newest):
             known = disregarded(known, reading, elapsed)
@@ -382,6 +383,16 @@ def _with_reading(strokes: Strokes, reading: Reading, is_identified: bool) -> St
 
 
 @compilable
+def _between(before: Lagging, after: Lagging) -> Lagging:
+    """Means of two samples: of the same time as the acceleration between them."""
+    return Lagging(
+        0.5 * (before.velocity + after.velocity),
+        0.5 * (before.force_sum + after.force_sum),
+        0.5 * (before.friction + after.friction),
+    )
+
+
+@compilable
 def _lagging(before: Lagging, newest: Lagging, share: float) -> Lagging:
     """Signals after one more lag."""
     velocity, force_sum, friction = before
@@ -456,7 +467,8 @@ def outlook_of(
         wrong_direction = WRONG_DIRECTION * friction
         most = most if most > wrong_direction else wrong_direction
     offset = terms.offset + way * terms.gradient
-    may_be_at_rest = not proven and abs(offset + terms.remainder) > BAND_95 * known.friction_std
+    explained = BAND_95 * math.sqrt(known.friction_std * known.friction_std + known.stepped)
+    may_be_at_rest = not proven and abs(offset + terms.remainder) > explained
     return Outlook(
         proven,
         BITS.MODEL_DISAGREES if known.unexplained.drift_square > wavers * wavers else 0,
@@ -635,8 +647,9 @@ def _std_of_sliding(state: AdaptationState, speed: float, law: float, file_std: 
         std *= law / last
     variance = std * std + stribeck * stribeck
     if speed > state.fastest:
-        untold = known.terms.viscous * (speed - state.fastest)
-        variance += untold * untold
+        faster, viscous = state.fastest / STRIBECK_SPEED, known.terms.viscous
+        untold, less = speed - state.fastest, slow / (1.0 + faster * faster)
+        variance += (viscous * viscous + known.covariance.kk) * untold * untold + less * less
     least, std = LEAST_STD * law, math.sqrt(variance + state.outlook.unexplained_square)
     return std if std > least else least
 
@@ -645,11 +658,12 @@ def _std_of_sliding(state: AdaptationState, speed: float, law: float, file_std: 
 def _unexplained_square(known: FrictionFilter) -> float:
     """Square of what readings show beside the friction and may be friction, beyond a usual drift [N^2].
 
-    That is most of what the offset took since the last reversal and the drift just now, or all that is not explained.
+    That is most of what the offset took since the last reversal and the drift just now, or what the steps since then
+    may have been, or all that is not explained.
     """
     unexplained = known.unexplained
     newest = unexplained.drift + MAY_BE_FRICTION * known.strayed
-    newest = newest * newest
+    newest = newest * newest if newest * newest > known.stepped else known.stepped
     largest = newest if newest > unexplained.square else unexplained.square
     return largest - unexplained.drift_square if largest > unexplained.drift_square else 0.0
 

@@ -68,7 +68,10 @@ OUTLIER = 2.5  # [-] innovations over their standard deviation count less beyond
 LEAP = 3.0  # [-] innovations over their deviation within two readings, or at the turn, that may begin a step
 STEP_READINGS = 10  # outliers in a row to one side that make it one,
 FEWEST_OUTLIERS = 3  # or these before the rod turns
-STEP_OF_FRICTION = 0.5  # [-] standard deviation of the scale over that of the offset after a step, both as forces
+STEP_OF_FRICTION = 0.5  # [-] of a step: standard deviation of what may be friction, until the next stroke tells
+STRAYED = (
+    0.25  # [-] squared, of what the offset took in a stroke: most that the next may miss of twice it if it was friction
+)
 LOADED = 2.0  # [-] squared innovation over the squared change at rest up to which that is its cause: lags take a part
 PROVEN = 0.25  # [-] share: standard deviation of the friction below which the motion has told it
 DRIFT_TIME = 0.08  # [s] over which white noise averages out of what is not explained
@@ -159,6 +162,7 @@ class FrictionFilter(NamedTuple):
     longest: float  # [m] way in one direction before
     gradient: float  # [N/m] g at the end of the direction before
     strayed: float  # [N] what readings in this direction have added to the offset: it may be friction until the next
+    stepped: float  # [N^2] square of what steps in this direction may have been of the friction
     friction: float  # [N] by the law then
     friction_std: float  # [N] of the friction then
     innovation_std: float  # [N] of its innovation
@@ -178,6 +182,7 @@ NOT_BEGUN = FrictionFilter(
     longest=SHORTEST_STROKE,
     gradient=0.0,
     strayed=0.0,
+    stepped=0.0,
     friction=0.0,
     friction_std=0.0,
     innovation_std=0.0,
@@ -328,26 +333,24 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
     usual = known.unexplained.usual
     noise = known.unexplained.noise * (reading.friction if reading.friction > usual else usual)
     gains = _gains(covariance, reading)
-    spread = expected(gains, reading)
-    variance = spread + noise * noise
-    surprise = innovation * innovation
-    is_load = innovation * reading.loaded > 0.0 and surprise < LOADED * reading.loaded * reading.loaded
-    if is_load and surprise > OUTLIER * OUTLIER * variance:
-        covariance = replace(covariance, bb=covariance.bb + surprise)
-        gains = _gains(covariance, reading)
-        spread = expected(gains, reading)
+    variance = expected(gains, reading) + noise * noise
+    stepped = known.stepped if reading.direction == known.direction else 0.0
+    freed, is_explained = _explained(known, reading, covariance, innovation, variance)
+    if is_explained:
         outliers, steps, left = replace(known.outliers, number=0), False, 0.0
     else:
         outliers, steps = _outliers(known, reading.direction, terms, innovation, variance)
         left = innovation
+        if steps:
+            terms = outliers.settled
+            innovation = reading.force - expected(terms, reading)
+            freed = replace(covariance, bb=covariance.bb + innovation * innovation)
+            stepped += STEP_OF_FRICTION * innovation * STEP_OF_FRICTION * innovation
     unexplained = _followed(known, reading.friction, left + terms.remainder, left * left / variance, moved)
-    if steps:
-        terms = outliers.settled
-        innovation = reading.force - expected(terms, reading)
-        covariance = _freed(covariance, innovation, reading.direction * reading.friction)
-        gains = _gains(covariance, reading)
-        spread = expected(gains, reading)
-    terms, covariance = _corrected(terms, covariance, gains, spread, innovation, noise)
+    if is_explained or steps:
+        gains = _gains(freed, reading)
+    if outliers.number == 0 or abs(outliers.number) > FEWEST_OUTLIERS:  # the first ones may begin a step
+        terms, covariance = _corrected(terms, freed, gains, expected(gains, reading), innovation, noise)
 
     untold = terms.gradient * (stroke - longest) if stroke > longest else 0.0
     std = friction_std(covariance, unexplained.drift_square + untold * untold, reading)
@@ -361,6 +364,7 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
         longest,
         gradient,
         strayed + terms.offset - offset if longest > SHORTEST_STROKE else 0.0,
+        stepped,
         reading.friction,
         std,
         math.sqrt(variance),
@@ -427,10 +431,36 @@ def _corrected(
 
 
 @compilable
+def _explained(
+    known: FrictionFilter, reading: Reading, covariance: Covariance, innovation: float, variance: float
+) -> tuple[Covariance, bool]:
+    """Covariance with what an outlier [N] frees if its cause is known, and whether it is.
+
+    A sudden change of the force sum in the rest before is a load: it frees the offset. A rod that has turned and misses
+    twice what the offset took in the stroke before, to the other side, shows that this was friction: it frees the
+    scale, and the offset as far as it made up for it.
+    """
+    surprise, strayed = innovation * innovation, known.strayed
+    if surprise <= OUTLIER * OUTLIER * variance:
+        return covariance, False
+    if innovation * reading.loaded > 0.0 and surprise < LOADED * reading.loaded * reading.loaded:
+        return replace(covariance, bb=covariance.bb + surprise), True
+    missed = innovation + 2.0 * strayed
+    if reading.direction == known.direction or missed * missed >= STRAYED * strayed * strayed:
+        return covariance, False
+    force = reading.direction * reading.friction
+    half = 0.25 * surprise  # [N^2] scale and offset show one half of it each
+    shared = half / force
+    return replace(
+        covariance, ss=covariance.ss + shared / force, sb=covariance.sb + shared, bb=covariance.bb + half
+    ), True
+
+
+@compilable
 def _outliers(
     known: FrictionFilter, direction: int, terms: Terms, innovation: float, variance: float
 ) -> tuple[Outliers, bool]:
-    """Outliers after an innovation [N], and whether they are a step of the load, or of the friction."""
+    """Outliers after an innovation [N], and whether they are a step."""
     number, last, second, settled = known.outliers
     turns, side = direction != known.direction, 0
     if innovation * innovation > OUTLIER * OUTLIER * variance:
@@ -453,6 +483,7 @@ def _followed(known: FrictionFilter, friction: float, unexplained: float, excess
     variance = noise * noise * (1.0 + moved / (moved + NOISE_TIME) * (excess - 1.0))
     if known.direction == 0:
         unexplained = 0.0  # all of it may be offset
+    unexplained = between(-friction, unexplained, friction)  # more is no error of a friction
     drift += moved / (moved + DRIFT_TIME) * (unexplained - drift)
     share = moved / (moved + DRIFT_MEMORY)
     return Unexplained(
@@ -462,24 +493,6 @@ def _followed(known: FrictionFilter, friction: float, unexplained: float, excess
         drift_square + share * (drift * drift - drift_square),
         square + share * (unexplained * unexplained - square),
     )
-
-
-@compilable
-def _freed(covariance: Covariance, innovation: float, force: float) -> Covariance:
-    """Covariance after a step that one direction does not explain: it counts as load, but it may be of the friction.
-
-    So the offset is freed, and a scale that the offset makes up for: the sum of both does not move the scale until the
-    next reversal tells them apart.
-
-    Args:
-        covariance: Before the step.
-        innovation: [N]
-        force: Friction of the law with the sign of the direction [N].
-    """
-    scale_variance = (STEP_OF_FRICTION * innovation / force) * (STEP_OF_FRICTION * innovation / force)
-    shared = -force * scale_variance
-    freed = innovation * innovation + force * force * scale_variance
-    return replace(covariance, ss=covariance.ss + scale_variance, sb=covariance.sb + shared, bb=covariance.bb + freed)
 
 
 @compilable
