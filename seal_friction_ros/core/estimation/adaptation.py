@@ -683,6 +683,8 @@ def _std_at_rest(state: AdaptationState, stamp: int, force_sum: float, most: flo
     variance = offset + remainder * remainder + strayed * strayed + rest.leapt * rest.leapt + step * step
     variance += AT_ONCE * AT_ONCE * (known.unexplained.square + noise)
     std = math.sqrt(variance) if variance > 0.0 else 0.0
+    unseen = known.load_step / ONE_SIDED_95  # the seals would hold it
+    std = std if std > unseen else unseen
     return std if std < most else most
 
 

@@ -69,9 +69,7 @@ LEAP = 3.0  # [-] innovations over their deviation within two readings, or at th
 STEP_READINGS = 10  # outliers in a row to one side that make it one,
 FEWEST_OUTLIERS = 3  # or these before the rod turns
 STEP_OF_FRICTION = 0.5  # [-] of a step: standard deviation of what may be friction, until the next stroke tells
-STRAYED = (
-    0.25  # [-] squared, of what the offset took in a stroke: most that the next may miss of twice it if it was friction
-)
+STRAYED = 0.75  # [-] of what the offset took in a stroke: what the next may miss about 1.5 of it, if it was friction
 LOADED = 2.0  # [-] squared innovation over the squared change at rest up to which that is its cause: lags take a part
 PROVEN = 0.25  # [-] share: standard deviation of the friction below which the motion has told it
 DRIFT_TIME = 0.08  # [s] over which white noise averages out of what is not explained
@@ -163,6 +161,7 @@ class FrictionFilter(NamedTuple):
     gradient: float  # [N/m] g at the end of the direction before
     strayed: float  # [N] what readings in this direction have added to the offset: it may be friction until the next
     stepped: float  # [N^2] square of what steps in this direction may have been of the friction
+    load_step: float  # [N] largest step, which fades over `USUAL_TIME` of motion: the next may come at rest, unseen
     friction: float  # [N] by the law then
     friction_std: float  # [N] of the friction then
     innovation_std: float  # [N] of its innovation
@@ -183,6 +182,7 @@ NOT_BEGUN = FrictionFilter(
     gradient=0.0,
     strayed=0.0,
     stepped=0.0,
+    load_step=0.0,
     friction=0.0,
     friction_std=0.0,
     innovation_std=0.0,
@@ -335,6 +335,7 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
     gains = _gains(covariance, reading)
     variance = expected(gains, reading) + noise * noise
     stepped = known.stepped if reading.direction == known.direction else 0.0
+    load_step = known.load_step * (1.0 - moved / USUAL_TIME)
     freed, is_explained = _explained(known, reading, covariance, innovation, variance)
     if is_explained:
         outliers, steps, left = replace(known.outliers, number=0), False, 0.0
@@ -346,6 +347,7 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
             innovation = reading.force - expected(terms, reading)
             freed = replace(covariance, bb=covariance.bb + innovation * innovation)
             stepped += STEP_OF_FRICTION * innovation * STEP_OF_FRICTION * innovation
+            load_step = abs(innovation) if abs(innovation) > load_step else load_step
     unexplained = _followed(known, reading.friction, left + terms.remainder, left * left / variance, moved)
     if is_explained or steps:
         gains = _gains(freed, reading)
@@ -365,6 +367,7 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
         gradient,
         strayed + terms.offset - offset if longest > SHORTEST_STROKE else 0.0,
         stepped,
+        load_step,
         reading.friction,
         std,
         math.sqrt(variance),
@@ -437,16 +440,17 @@ def _explained(
     """Covariance with what an outlier [N] frees if its cause is known, and whether it is.
 
     A sudden change of the force sum in the rest before is a load: it frees the offset. A rod that has turned and misses
-    twice what the offset took in the stroke before, to the other side, shows that this was friction: it frees the
-    scale, and the offset as far as it made up for it.
+    twice what the offset took in the stroke before, to the other side, shows that this was friction; so does one that
+    misses as much as it took at the turn before: friction that is gone. That frees the scale, and the offset as far as
+    it made up for it.
     """
     surprise, strayed = innovation * innovation, known.strayed
     if surprise <= OUTLIER * OUTLIER * variance:
         return covariance, False
     if innovation * reading.loaded > 0.0 and surprise < LOADED * reading.loaded * reading.loaded:
         return replace(covariance, bb=covariance.bb + surprise), True
-    missed = innovation + 2.0 * strayed
-    if reading.direction == known.direction or missed * missed >= STRAYED * strayed * strayed:
+    missed = innovation + 1.5 * strayed
+    if reading.direction == known.direction or abs(missed) >= STRAYED * abs(strayed):
         return covariance, False
     force = reading.direction * reading.friction
     half = 0.25 * surprise  # [N^2] scale and offset show one half of it each

@@ -33,8 +33,8 @@ from seal_friction_ros.core.estimation.friction_filter import (
     REMAINDER_TIME,
     SCALE_PRIOR,
     SHORTEST_STROKE,
-    STEP_OF_FRICTION,
     STEP_READINGS,
+    STRAYED,
     USUAL_TIME,
     VISCOUS_PRIOR,
     WALK,
@@ -129,8 +129,15 @@ class Textbook:
         self.stamp, self.noise, self.usual, self.number = first.stamp, LEAST_NOISE, force, 0
         self.direction, self.last, self.second, self.law = 0, 0.0, 0.0, force
         self.mean = self.settled = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-        self.stroke, self.longest, self.drift, self.drift_square = 0.0, SHORTEST_STROKE, 0.0, 0.0
-        self.covariance, self.steps = np.diag(np.square(prior)), 0
+        self.shown, self.stroke, self.longest, self.drift, self.drift_square = (
+            SHORTEST_STROKE,
+            0.0,
+            SHORTEST_STROKE,
+            0.0,
+            0.0,
+        )
+        self.covariance, self.steps, self.friction_steps = np.diag(np.square(prior)), 0, 0
+        self.strayed, self.gradient = 0.0, 0.0
 
     def predict(self, law: float, elapsed: float, moved: float, way: float) -> None:
         kept = REMAINDER_TIME / (REMAINDER_TIME + elapsed)
@@ -151,29 +158,41 @@ class Textbook:
         elapsed = min(max((reading.stamp - self.stamp) * 1e-9, 0.0), 3600.0)
         self.stamp = reading.stamp
         moved = min(elapsed, LONGEST_STEP)
-        self.stroke = abs(way) + (self.stroke if direction == self.direction else 0.0)
+        turns, strayed, before = direction != self.direction, self.strayed, self.mean[5]
+        self.shown = max(self.shown, self.stroke) if turns else self.shown
+        self.gradient, self.strayed = (
+            (before, 0.0) if turns else (self.gradient, strayed + way * (before - self.gradient))
+        )
+        self.stroke = abs(way) + (0.0 if turns else self.stroke)
         self.longest = max(self.longest, self.stroke)
         self.predict(law, elapsed, moved, way)
+        offset = self.mean[4]
         row = np.array([direction * law, direction, velocity, law, 1.0, 0.0, 1.0, direction])
         missed = force - row @ self.mean
-        self.follow_drift(missed + self.mean[6], moved)
         spread = self.noise * max(law, self.usual)
         self.usual += moved / (moved + USUAL_TIME) * (law - self.usual)
         expected = row @ self.covariance @ row + spread**2
-        follow = moved / (moved + NOISE_TIME) * (min(missed**2 / expected, OUTLIER**2) - 1.0)
+        was_friction = (
+            turns and abs(missed + 1.5 * strayed) < STRAYED * abs(strayed) and missed**2 > OUTLIER**2 * expected
+        )
+        left = 0.0 if was_friction else missed
+        self.follow_drift(float(np.clip(left + self.mean[6], -law, law)), moved)
+        follow = moved / (moved + NOISE_TIME) * (min(left**2 / expected, OUTLIER**2) - 1.0)
         noise = min(max(math.sqrt(self.noise**2 * (1.0 + follow)), LEAST_NOISE), 1.0)
-        if self.is_step(direction, missed, expected):
+        if was_friction:  # scale and offset show one half of it each
+            both = np.array([direction / law, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+            self.covariance += (missed / 2.0) ** 2 * np.outer(both, both)
+            self.number, self.direction, self.friction_steps = 0, direction, self.friction_steps + 1
+        elif self.is_step(direction, missed, expected):
             self.mean, self.steps = self.settled, self.steps + 1
             missed = force - row @ self.mean
-            made_up = np.array(
-                [1.0, 0.0, 0.0, 0.0, -direction * law, 0.0, 0.0, 0.0]
-            )  # scale that the offset makes up for
-            self.covariance += (STEP_OF_FRICTION * missed / law) ** 2 * np.outer(made_up, made_up)
             self.covariance[4, 4] += missed**2
-        gain = self.covariance @ row / self.weighted(row, missed, spread)
-        self.mean = self.mean + gain * missed
-        self.covariance = (np.eye(8) - np.outer(gain, row)) @ self.covariance
+        if self.number == 0 or abs(self.number) > FEWEST_OUTLIERS:
+            gain = self.covariance @ row / self.weighted(row, missed, spread)
+            self.mean = self.mean + gain * missed
+            self.covariance = (np.eye(8) - np.outer(gain, row)) @ self.covariance
         self.noise = noise
+        self.strayed = self.strayed + self.mean[4] - offset if self.shown > SHORTEST_STROKE else 0.0
         if self.number == 0:
             self.settled = self.mean
 
