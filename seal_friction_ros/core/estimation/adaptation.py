@@ -27,9 +27,11 @@ from seal_friction_ros.core.estimation.friction_filter import (
     PROVEN,
     SCALE_PRIOR,
     USUAL_TIME,
+    WRONG_DIRECTION,
     FrictionFilter,
     Reading,
     disregarded,
+    doubt_of,
     friction_magnitude,
     updated,
 )
@@ -63,7 +65,6 @@ LONGEST_STEP = 0.1  # [s] after a longer gap the acceleration starts anew
 LEARNING_INTERVAL = 9_500_000  # [ns] least time between two samples that are learnt from: all of a log at 100 Hz
 LEAST_STD = 0.01  # [-] of the friction, below which no standard deviation is believed
 IMPLAUSIBLE = 5.0  # [-] innovation over its standard deviation that is a fault of its own
-WRONG_DIRECTION = 1.5  # [-] of the friction that a sample misses whose direction is wrong: it misses twice the friction
 STRIBECK = 0.2  # [-] of the friction: standard deviation of what it is more when slow,
 STRIBECK_SPEED = 0.008  # [m/s] as from this speed
 NEW_RUN = math.hypot(SCALE_PRIOR, COULOMB_PRIOR)  # [-] of the friction: standard deviation of another day
@@ -286,7 +287,7 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
         by_motion = _moved(by_motion, newest_way if state.fastest < slide.slow else way)
     elif state.fastest < slide.slow:  # the slow motion before may have been the zero of its sensor
         known, way = by_motion, newest_way
-    meant = _between(state.twice, twice) if abs(acceleration) > settings.acceleration_max else twice
+    meant = _middle(state.twice, twice) if abs(acceleration) > settings.acceleration_max else twice
     most = JUMPED if slide.is_identified and not strokes.present.is_identified else math.inf
     is_settled = most * friction >= twice.friction * direction >= SETTLED * friction >= LEAST_FRICTION
     if is_settled and slide.is_usable and slide.is_identified and since_turn > TURNED:
@@ -383,7 +384,7 @@ def _with_reading(strokes: Strokes, reading: Reading, is_identified: bool) -> St
 
 
 @compilable
-def _between(before: Lagging, after: Lagging) -> Lagging:
+def _middle(before: Lagging, after: Lagging) -> Lagging:
     """Means of two samples: of the same time as the acceleration between them."""
     return Lagging(
         0.5 * (before.velocity + after.velocity),
@@ -467,7 +468,7 @@ def outlook_of(
         wrong_direction = WRONG_DIRECTION * friction
         most = most if most > wrong_direction else wrong_direction
     offset = terms.offset + way * terms.gradient
-    explained = BAND_95 * math.sqrt(known.friction_std * known.friction_std + known.stepped)
+    explained = BAND_95 * math.sqrt(doubt_of(known))
     may_be_at_rest = not proven and abs(offset + terms.remainder) > explained
     return Outlook(
         proven,
@@ -533,7 +534,7 @@ def friction_of_sliding(
             at_no_speed, std, stiction, friction.in_identified_range, sliding - at_no_speed, asymmetry
         )
         return adapted, direction * found, contradicts
-    missed, doubt = found - law, file_std * file_std + known.friction_std * known.friction_std
+    missed, doubt = found - law, file_std * file_std + doubt_of(known)
     std = _about(abs(sliding - law), std)
     adapted = ActuatorFriction(
         coulomb, std, friction.stiction, friction.in_identified_range, added, friction.breakaway_asymmetry
@@ -588,7 +589,7 @@ def friction_at_rest(
             at_no_speed, coulomb_std, stiction * scale, is_in_range, sliding - at_no_speed, asymmetry * scale
         )
         return adapted, std, is_pressed or contradicts
-    missed, doubt = found - law, file_std * file_std + known.friction_std * known.friction_std
+    missed, doubt = found - law, file_std * file_std + doubt_of(known)
     std = _about(abs(outlook.offset), std)
     coulomb_std = _about(abs(sliding - law), coulomb_std)
     coulomb_std = coulomb_std if coulomb_std > std else std

@@ -68,10 +68,12 @@ OUTLIER = 2.5  # [-] innovations over their standard deviation count less beyond
 LEAP = 3.0  # [-] innovations over their deviation within two readings, or at the turn, that may begin a step
 STEP_READINGS = 10  # outliers in a row to one side that make it one,
 FEWEST_OUTLIERS = 3  # or these before the rod turns
-STEP_OF_FRICTION = 0.5  # [-] of a step: standard deviation of what may be friction, until the next stroke tells
-STRAYED = 0.75  # [-] of what the offset took in a stroke: what the next may miss about 1.5 of it, if it was friction
+STEP_OF_FRICTION = 0.6  # [-] of a step: standard deviation of what may be friction (all of it), until a stroke tells
+LEAST_STRAYED = 0.75  # [-] of what the offset took in a stroke: what the next misses at least, if it was friction,
+MOST_STRAYED = 2.25  # [-] and at most: once if it is gone again, else twice
 LOADED = 2.0  # [-] squared innovation over the squared change at rest up to which that is its cause: lags take a part
 PROVEN = 0.25  # [-] share: standard deviation of the friction below which the motion has told it
+WRONG_DIRECTION = 1.5  # [-] of the friction that a sample misses whose direction is wrong: it misses twice the friction
 DRIFT_TIME = 0.08  # [s] over which white noise averages out of what is not explained
 DRIFT_MEMORY = 10.0  # [s] over which the size of the rest is known
 LONGEST_STEP = 0.1  # [s] of motion that one sample stands for
@@ -379,6 +381,12 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
 
 
 @compilable
+def doubt_of(known: FrictionFilter) -> float:
+    """Variance of the friction that the readings leave [N^2]; nothing tells yet whose a step in this direction was."""
+    return known.friction_std * known.friction_std + known.stepped
+
+
+@compilable
 def disregarded(known: FrictionFilter, reading: Reading, elapsed: float) -> FrictionFilter:
     """Filter after an outlier of a rod that may be at rest: nothing is learnt from it, but the band holds it.
 
@@ -449,8 +457,8 @@ def _explained(
         return covariance, False
     if innovation * reading.loaded > 0.0 and surprise < LOADED * reading.loaded * reading.loaded:
         return replace(covariance, bb=covariance.bb + surprise), True
-    missed = innovation + 1.5 * strayed
-    if reading.direction == known.direction or abs(missed) >= STRAYED * abs(strayed):
+    missed, square = -innovation * strayed, strayed * strayed
+    if reading.direction == known.direction or not LEAST_STRAYED * square < missed < MOST_STRAYED * square:
         return covariance, False
     force = reading.direction * reading.friction
     half = 0.25 * surprise  # [N^2] scale and offset show one half of it each
@@ -487,7 +495,8 @@ def _followed(known: FrictionFilter, friction: float, unexplained: float, excess
     variance = noise * noise * (1.0 + moved / (moved + NOISE_TIME) * (excess - 1.0))
     if known.direction == 0:
         unexplained = 0.0  # all of it may be offset
-    unexplained = between(-friction, unexplained, friction)  # more is no error of a friction
+    most = WRONG_DIRECTION * friction  # more is no error of a friction
+    unexplained = between(-most, unexplained, most)
     drift += moved / (moved + DRIFT_TIME) * (unexplained - drift)
     share = moved / (moved + DRIFT_MEMORY)
     return Unexplained(

@@ -20,7 +20,9 @@ from seal_friction_ros.core.estimation.friction_filter import (
     GRADIENT_WALK,
     LEAP,
     LEAST_NOISE,
+    LEAST_STRAYED,
     LONGEST_STEP,
+    MOST_STRAYED,
     MISFIT,
     MISFIT_RANGE,
     NOISE_TIME,
@@ -34,10 +36,10 @@ from seal_friction_ros.core.estimation.friction_filter import (
     SCALE_PRIOR,
     SHORTEST_STROKE,
     STEP_READINGS,
-    STRAYED,
     USUAL_TIME,
     VISCOUS_PRIOR,
     WALK,
+    WRONG_DIRECTION,
     FrictionFilter,
     Reading,
     Terms,
@@ -173,10 +175,13 @@ class Textbook:
         self.usual += moved / (moved + USUAL_TIME) * (law - self.usual)
         expected = row @ self.covariance @ row + spread**2
         was_friction = (
-            turns and abs(missed + 1.5 * strayed) < STRAYED * abs(strayed) and missed**2 > OUTLIER**2 * expected
+            turns
+            and LEAST_STRAYED * strayed**2 < -missed * strayed < MOST_STRAYED * strayed**2
+            and missed**2 > OUTLIER**2 * expected
         )
         left = 0.0 if was_friction else missed
-        self.follow_drift(float(np.clip(left + self.mean[6], -law, law)), moved)
+        most = WRONG_DIRECTION * law
+        self.follow_drift(float(np.clip(left + self.mean[6], -most, most)), moved)
         follow = moved / (moved + NOISE_TIME) * (min(left**2 / expected, OUTLIER**2) - 1.0)
         noise = min(max(math.sqrt(self.noise**2 * (1.0 + follow)), LEAST_NOISE), 1.0)
         if was_friction:  # scale and offset show one half of it each
