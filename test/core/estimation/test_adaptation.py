@@ -424,6 +424,21 @@ def test_a_step_that_has_begun_when_the_rod_comes_to_rest_is_in_the_deviation_th
     assert BAND_95 * std > 40.0
 
 
+def test_a_load_as_large_as_the_last_may_come_at_rest_where_nothing_shows_it():
+    """The seals hold a payload of half their friction that is put down slowly."""
+
+    def held(state):
+        rested = adapted(moving(1.0, lambda _: 0.0, lambda _: 36.0, state.stamp + SECOND // 100), state=state)
+        by_file = ActuatorFriction(40.0, 2.0, 60.0, True, 0.0, 0.0)
+        return BAND_95 * friction_at_rest(SETTINGS, rested, by_file, rested.stamp, 36.0, True)[1]
+
+    taught = adapted(strokes(10.3, friction=40.0))
+    loaded = adapted(strokes(6.0, friction=40.0, offset=20.0, start=taught.stamp + SECOND // 100), state=taught)
+    unloaded = adapted(strokes(10.3, friction=40.0, start=loaded.stamp + SECOND // 100), state=loaded)
+    assert learnt(unloaded).offset == pytest.approx(0.0, abs=2.0)
+    assert held(taught) < 10.0 < 20.0 <= held(unloaded)
+
+
 def std_at(state, speed):
     """Standard deviation of the friction of 40 N of a rod that slides [N]."""
     by_file = ActuatorFriction(40.0, 2.0, 0.0, True, 0.0, 0.0)
@@ -447,6 +462,13 @@ def test_what_rests_held_counts_once_the_offset_is_told_and_up_to_the_largest_sc
     taught = adapted(strokes(10.0, friction=40.0))
     most = (SETTINGS.scale_max - learnt(taught).scale) * 40.0
     assert rest(5000.0, taught).rest.held == pytest.approx(most, rel=0.02)  # an end stop
+
+
+def test_friction_learnt_while_creeping_may_be_less_when_fast():
+    """Stribeck's, which slow strokes cannot tell from Coulomb's."""
+    crept = adapted(slide._replace(velocity=0.25 * slide.velocity) for slide in strokes(20.0, friction=55.0))
+    assert learnt(crept).scale * 40.0 == pytest.approx(55.0, rel=0.05)
+    assert BAND_95 * std_at(crept, 0.05) > 15.0
 
 
 def test_an_offset_that_rises_over_the_way_is_where_the_rod_is_after_a_rest_of_minutes():
