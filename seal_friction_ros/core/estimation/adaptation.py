@@ -25,6 +25,7 @@ from seal_friction_ros.core.estimation.friction_filter import (
     NOT_BEGUN,
     OUTLIER,
     PROVEN,
+    REMAINDER_TIME,
     SCALE_PRIOR,
     USUAL_TIME,
     WRONG_DIRECTION,
@@ -65,6 +66,7 @@ LONGEST_STEP = 0.1  # [s] after a longer gap the acceleration starts anew
 LEARNING_INTERVAL = 9_500_000  # [ns] least time between two samples that are learnt from: all of a log at 100 Hz
 LEAST_STD = 0.01  # [-] of the friction, below which no standard deviation is believed
 IMPLAUSIBLE = 5.0  # [-] innovation over its standard deviation that is a fault of its own
+UNKNOWN_DELAY = 0.01  # [s] standard deviation: inertia that is late is like friction that grows with speed
 STRIBECK = 0.2  # [-] of the friction: standard deviation of what it is more when slow,
 STRIBECK_SPEED = 0.008  # [m/s] as from this speed
 NEW_RUN = math.hypot(SCALE_PRIOR, COULOMB_PRIOR)  # [-] of the friction: standard deviation of another day
@@ -195,6 +197,7 @@ class AdaptationState(NamedTuple):
     acceleration: float  # [m/s^2] of the velocity after two lags
     way: float  # [m] since the last reading of the filter
     fastest: float  # [m/s] fastest speed of a reading, which fades over `USUAL_TIME`
+    inertia_rate: float  # [N/s] by which inertia falls in the direction of motion, mean over `REMAINDER_TIME` of readings
     filter: FrictionFilter
     by_motion: FrictionFilter  # the filter without readings of a rod that may have rested all the time
     strokes: Strokes
@@ -213,6 +216,7 @@ NOT_ADAPTED = AdaptationState(
     acceleration=0.0,
     way=0.0,
     fastest=0.0,
+    inertia_rate=0.0,
     filter=NOT_BEGUN,
     by_motion=NOT_BEGUN,
     strokes=Strokes(),
@@ -269,7 +273,7 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     at_first = (velocity - state.once.velocity) / (elapsed + LAG)
     acceleration = (once.velocity - state.twice.velocity) / (elapsed + LAG)
     rest = _rested(settings, state, slide, direction, elapsed)
-    known, strokes = state.filter, state.strokes
+    known, strokes, rate = state.filter, state.strokes, state.inertia_rate
     speed, fastest = abs(velocity), state.fastest * (1.0 - elapsed / USUAL_TIME)
     has_turned = direction == 0 or state.twice.velocity * twice.velocity <= 0.0
     since_turn = 0.0 if has_turned else state.since_turn + elapsed * abs(twice.velocity)
@@ -287,7 +291,7 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
         by_motion = _moved(by_motion, newest_way if state.fastest < slide.slow else way)
     elif state.fastest < slide.slow:  # the slow motion before may have been the zero of its sensor
         known, way = by_motion, newest_way
-    meant = _middle(state.twice, twice) if abs(acceleration) > settings.acceleration_max else twice
+    meant = _middle(state.twice, twice) if knows_inertia else twice
     most = JUMPED if slide.is_identified and not strokes.present.is_identified else math.inf
     is_settled = most * friction >= twice.friction * direction >= SETTLED * friction >= LEAST_FRICTION
     if is_settled and slide.is_usable and slide.is_identified and since_turn > TURNED:
@@ -297,6 +301,8 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
         force, law = meant.force_sum - of_inertia, meant.friction * direction
         reading = Reading(slide.stamp, force, direction, meant.velocity, way, law, slide.friction_std, rest.loaded)
         strokes = _with_reading(strokes, reading, slide.is_identified)
+        of_last = state.outlook.taken_off - state.outlook.unsteady_offset
+        rate += elapsed / (elapsed + REMAINDER_TIME) * (direction * (of_last - of_inertia) / elapsed - rate)
         if may_rest and slide.is_identified and known.stamp != NEVER and _is_outlier(state, newest):
             known = disregarded(known, reading, elapsed)
         elif slide.is_identified:
@@ -306,7 +312,7 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     outlook = outlook_of(settings, known, way, of_inertia, may_have_inertia, speed < slide.slow <= fastest)
     by_motion = known if fastest >= slide.slow else by_motion
     return AdaptationState(
-        slide.stamp, once, twice, acceleration, way, fastest, known, by_motion, strokes, rest, outlook, mass,
+        slide.stamp, once, twice, acceleration, way, fastest, rate, known, by_motion, strokes, rest, outlook, mass,
         since_turn, sums,
     )  # fmt: skip
 
@@ -646,7 +652,8 @@ def _std_of_sliding(state: AdaptationState, speed: float, law: float, file_std: 
     stribeck = (held if held > slow else slow) / (1.0 + faster * faster)
     if law > last:
         std *= law / last
-    variance = std * std + stribeck * stribeck
+    late = UNKNOWN_DELAY * state.inertia_rate
+    variance = std * std + stribeck * stribeck + late * late
     if speed > state.fastest:
         faster, viscous = state.fastest / STRIBECK_SPEED, known.terms.viscous
         untold, less = speed - state.fastest, slow / (1.0 + faster * faster)
