@@ -197,7 +197,7 @@ class AdaptationState(NamedTuple):
     acceleration: float  # [m/s^2] of the velocity after two lags
     way: float  # [m] since the last reading of the filter
     fastest: float  # [m/s] fastest speed of a reading, which fades over `USUAL_TIME`
-    inertia_rate: float  # [N/s] by which inertia falls in the direction of motion, mean over `REMAINDER_TIME` of readings
+    inertia_rate: float  # [N/s] by which inertia falls along the motion: mean over `REMAINDER_TIME` of readings
     filter: FrictionFilter
     by_motion: FrictionFilter  # the filter without readings of a rod that may have rested all the time
     strokes: Strokes
@@ -667,11 +667,13 @@ def _unexplained_square(known: FrictionFilter) -> float:
     """Square of what readings show beside the friction and may be friction, beyond a usual drift [N^2].
 
     That is most of what the offset took since the last reversal and the drift just now, or what the steps since then
-    may have been, or all that is not explained.
+    may have been, or one that has begun, or all that is not explained.
     """
     unexplained = known.unexplained
     newest = unexplained.drift + MAY_BE_FRICTION * known.strayed
     newest = newest * newest if newest * newest > known.stepped else known.stepped
+    begun = known.outliers.last * known.outliers.last if known.outliers.number != 0 else 0.0
+    newest = newest if newest > begun else begun
     largest = newest if newest > unexplained.square else unexplained.square
     return largest - unexplained.drift_square if largest > unexplained.drift_square else 0.0
 

@@ -176,7 +176,7 @@ class Configuration:
         return PipelineParameters(EstimatorParameters(self.settings, seals, self.adaptation), self.feedforward)
 
 
-ALGORITHM_VERSION = 14
+ALGORITHM_VERSION = 15
 """Version of estimator and feed-forward: it changes when the same messages give other bytes.
 
 1: until the feed-forward had one gain, and time was the stamps of the messages. 2: until one filter learnt the

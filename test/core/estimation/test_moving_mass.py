@@ -8,6 +8,7 @@ from seal_friction_ros.core.estimation.moving_mass import (
     BEYOND,
     NO_ACCELERATIONS,
     NO_MASS,
+    UNSURE,
     Accelerations,
     accelerated,
     inertia_of,
@@ -83,11 +84,13 @@ def test_another_payload_is_learnt_within_a_few_strokes():
     assert inertia_of(0.0, known).mass == pytest.approx(50.0, rel=0.1)
 
 
-def test_a_given_mass_is_exact_at_any_acceleration():
-    wrong = after_stroke(NO_MASS, stroke(lambda _, a: 5.0 * a))
+def test_a_given_mass_holds_at_any_acceleration_until_strokes_contradict_it():
+    assert is_inertia_known(inertia_of(20.0, NO_MASS), 1e6, 40.0)
+    right, wrong = (after_stroke(NO_MASS, stroke(lambda _, a, m=m: m * a)) for m in (20.0, 5.0))
+    assert is_inertia_known(inertia_of(20.0, right), 1e3, 40.0)
     inertia = inertia_of(20.0, wrong)
-    assert inertia.mass == 20.0
-    assert is_inertia_known(inertia, 1e6, 40.0)
+    assert (inertia.mass, inertia.std) == (20.0, pytest.approx(15.0))
+    assert not is_inertia_known(inertia, 1.01 * UNSURE * 40.0 / 15.0, 40.0)
 
 
 def test_before_a_stroke_and_beyond_the_accelerations_of_the_strokes_nothing_is_known():
