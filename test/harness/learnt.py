@@ -11,5 +11,7 @@ def learnt_state(
 ) -> AdaptationState:
     """``state`` with ``changes``, and the outlook that belongs to them."""
     state = state._replace(**changes)
-    outlook = outlook_of(settings, state.filter, state.way, settings.moving_mass * state.acceleration, False, False)
+    outlook = outlook_of(
+        settings, state.filter, state.way, settings.moving_mass * state.motion.acceleration, False, False
+    )
     return state._replace(outlook=outlook)

@@ -2,8 +2,8 @@ r"""What the motion teaches about the friction: signals made ready for the filte
 
 While the rod slides evenly, or its inertia is known (`moving_mass`), the force sum less inertia is a reading for the
 `friction_filter`. Force sum, friction of the law
-and velocity go through **the same two lags**, of which the acceleration is taken: so inertia and friction are compared
-at one and the same time, also while the rod accelerates. Nothing is learnt at rest or with a bad input.
+and velocity are **means over the two intervals before**, as the acceleration is: by the trapezoidal rule inertia and
+friction are compared at one and the same time. Nothing is learnt at rest or with a bad input.
 
 **Consistency.** Each sample of a sliding rod is compared with what the filter expects. What drifts beside that widens
 the band: it may be friction. An innovation of more than `IMPLAUSIBLE` standard deviations is not explained by anything
@@ -57,10 +57,10 @@ MODES = ('off', 'observe', 'on')
 
 TURNED = 1e-3  # [m] of a stroke after which an accelerated sample is a reading, or shows the mass
 ONE_SIDED_95 = 1.644854  # [-] 95 % of a normal distribution are below it
-LAG = 0.005  # [s] time constant of each of the two lags of all signals, with which the acceleration is taken
 LEAST_FRICTION = 1e-3  # [N] of the law, below which there is nothing to learn
-SETTLED = 0.99  # [-] of the friction, which its lagging value must have reached after a reversal,
-JUMPED = 1.1  # [-] of it that the lagging value must not exceed after a pressure that the law does not know
+SETTLING = 0.01  # [s] time constant of a friction that follows that of the law: seals shear before they slide
+SETTLED = 0.99  # [-] of the friction, which that one must have reached after a reversal,
+JUMPED = 1.1  # [-] of it that that one must not exceed after a pressure that the law does not know
 LARGEST_INERTIA = 0.5  # [-] of the friction, in a reading with a known mass: the mass may be wrong
 LONGEST_STEP = 0.1  # [s] after a longer gap the acceleration starts anew
 LEARNING_INTERVAL = 9_500_000  # [ns] least time between two samples that are learnt from: all of a log at 100 Hz
@@ -119,12 +119,23 @@ class AdaptationSettings:
             raise ValueError(f'AdaptationSettings.mode = {self.mode!r} is not one of {", ".join(MODES)}')
 
 
-class Lagging(NamedTuple):
-    """Signals after one lag, or after two: what has the same lags can be compared."""
+class Signals(NamedTuple):
+    """Of one sample, or means of some."""
 
     velocity: float  # [m/s]
     force_sum: float  # [N]
     friction: float  # [N] f d of the law; 0.0 at rest
+
+
+class Motion(NamedTuple):
+    """What the last samples show: means of the same intervals can be compared."""
+
+    newest: Signals
+    once: Signals  # mean over the last interval
+    twice: Signals  # mean over the last two
+    at_first: float  # [m/s^2] acceleration over the last interval
+    acceleration: float  # [m/s^2] over the last two
+    settled: float  # [N] friction of the law after `SETTLING`, with its sign
 
 
 class Stroke(NamedTuple):
@@ -154,12 +165,13 @@ class Rest(NamedTuple):
     """What the force sum does while the rod rests."""
 
     slid: int = NEVER  # [ns] stamp of the last sample of a sliding rod
-    ripple: float = 0.0  # [N^2] mean square of the force sum against its lagging value, over `RIPPLE_TIME`
+    ripple: float = 0.0  # [N^2] mean square of the force sum against its mean before, over `RIPPLE_TIME`
     pressed: float = 0.0  # [s] of this rest under the breakaway force, in all
     leapt: float = 0.0  # [N] largest sudden change of the force sum in this rest
     leapt_at: int = NEVER  # [ns] its stamp
     loaded: float = 0.0  # [N] a sudden change within a rest, until the next reading: it may be a load
     held: float = 0.0  # [N] most that rests held beyond the sliding friction, which fades over `USUAL_TIME`
+    left: float = 0.0  # [N] of the force sum that the end of the motion did not explain: an inertia, or a load
 
 
 NO_REST = Rest()
@@ -192,9 +204,7 @@ class AdaptationState(NamedTuple):
     """What one sample leaves for the next."""
 
     stamp: int  # [ns] of the last sample that was taken; `NEVER` before the first
-    once: Lagging
-    twice: Lagging
-    acceleration: float  # [m/s^2] of the velocity after two lags
+    motion: Motion
     way: float  # [m] since the last reading of the filter
     fastest: float  # [m/s] fastest speed of a reading, which fades over `USUAL_TIME`
     inertia_rate: float  # [N/s] by which inertia falls along the motion: mean over `REMAINDER_TIME` of readings
@@ -208,12 +218,10 @@ class AdaptationState(NamedTuple):
     accelerations: Accelerations  # of the present stroke
 
 
-NO_SIGNALS = Lagging(0.0, 0.0, 0.0)
+NO_SIGNALS = Signals(0.0, 0.0, 0.0)
 NOT_ADAPTED = AdaptationState(
     stamp=NEVER,
-    once=NO_SIGNALS,
-    twice=NO_SIGNALS,
-    acceleration=0.0,
+    motion=Motion(NO_SIGNALS, NO_SIGNALS, NO_SIGNALS, 0.0, 0.0, 0.0),
     way=0.0,
     fastest=0.0,
     inertia_rate=0.0,
@@ -263,19 +271,16 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     """
     velocity, friction = slide.velocity, slide.friction
     direction = (1 if velocity > 0.0 else -1) if velocity != 0.0 else 0
-    newest = Lagging(velocity, slide.force_sum, friction * direction)
+    newest = Signals(velocity, slide.force_sum, friction * direction)
     elapsed = (slide.stamp - state.stamp) * 1e-9 if state.stamp != NEVER else 0.0
     if not 0.0 < elapsed <= LONGEST_STEP:
         return _interrupted(settings, state, slide.stamp, newest)
-    share = elapsed / (elapsed + LAG)
-    once = _lagging(state.once, newest, share)
-    twice = _lagging(state.twice, once, share)
-    at_first = (velocity - state.once.velocity) / (elapsed + LAG)
-    acceleration = (once.velocity - state.twice.velocity) / (elapsed + LAG)
+    before, motion = state.motion.twice, _motion_after(state.motion, newest, elapsed)
+    twice, at_first, acceleration = motion.twice, motion.at_first, motion.acceleration
     rest = _rested(settings, state, slide, direction, elapsed)
     known, strokes, rate = state.filter, state.strokes, state.inertia_rate
     speed, fastest = abs(velocity), state.fastest * (1.0 - elapsed / USUAL_TIME)
-    has_turned = direction == 0 or state.twice.velocity * twice.velocity <= 0.0
+    has_turned = direction == 0 or before.velocity * twice.velocity <= 0.0
     since_turn = 0.0 if has_turned else state.since_turn + elapsed * abs(twice.velocity)
     mass, sums = state.mass, NO_ACCELERATIONS if has_turned else state.accelerations
     inertia = inertia_of(settings.moving_mass, mass)
@@ -285,21 +290,20 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     is_readable = _is_readable(settings, slide, inertia, since_turn, largest) and direction != 0
     fastest = speed if is_readable and speed > fastest else fastest
     may_rest = speed < slide.slow <= fastest  # a rod that is never faster could not be learnt from at all
-    way = state.way + 0.5 * elapsed * (state.twice.velocity + twice.velocity)
+    way = state.way + 0.5 * elapsed * (before.velocity + twice.velocity)
     by_motion, newest_way = state.by_motion, way - state.way
     if fastest < slide.slow:
         by_motion = _moved(by_motion, newest_way if state.fastest < slide.slow else way)
     elif state.fastest < slide.slow:  # the slow motion before may have been the zero of its sensor
         known, way = by_motion, newest_way
-    meant = _middle(state.twice, twice) if knows_inertia else twice
     most = JUMPED if slide.is_identified and not strokes.present.is_identified else math.inf
-    is_settled = most * friction >= twice.friction * direction >= SETTLED * friction >= LEAST_FRICTION
+    is_settled = most * friction >= motion.settled * direction >= SETTLED * friction >= LEAST_FRICTION
     if is_settled and slide.is_usable and slide.is_identified and since_turn > TURNED:
-        unexplained = meant.force_sum - meant.friction
-        mass, sums = followed(mass, sums, abs(meant.velocity), acceleration, unexplained, elapsed)
+        unexplained = twice.force_sum - twice.friction
+        mass, sums = followed(mass, sums, abs(twice.velocity), acceleration, unexplained, elapsed)
     if is_readable and is_settled:
-        force, law = meant.force_sum - of_inertia, meant.friction * direction
-        reading = Reading(slide.stamp, force, direction, meant.velocity, way, law, slide.friction_std, rest.loaded)
+        force, law = twice.force_sum - of_inertia, twice.friction * direction
+        reading = Reading(slide.stamp, force, direction, twice.velocity, way, law, slide.friction_std, rest.loaded)
         strokes = _with_reading(strokes, reading, slide.is_identified)
         of_last = state.outlook.taken_off - state.outlook.unsteady_offset
         rate += elapsed / (elapsed + REMAINDER_TIME) * (direction * (of_last - of_inertia) / elapsed - rate)
@@ -311,21 +315,23 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     may_have_inertia = not knows_inertia and abs(acceleration) > settings.acceleration_max
     outlook = outlook_of(settings, known, way, of_inertia, may_have_inertia, speed < slide.slow <= fastest)
     by_motion = known if fastest >= slide.slow else by_motion
+    if direction != 0 and slide.is_usable and known.stamp != NEVER:
+        found = friction_magnitude(known.terms, direction, speed, friction)
+        rest = replace(rest, left=twice.force_sum - outlook.taken_off - direction * found)
     return AdaptationState(
-        slide.stamp, once, twice, acceleration, way, fastest, rate, known, by_motion, strokes, rest, outlook, mass,
-        since_turn, sums,
+        slide.stamp, motion, way, fastest, rate, known, by_motion, strokes, rest, outlook, mass, since_turn, sums,
     )  # fmt: skip
 
 
 @compilable
-def _interrupted(settings: AdaptationSettings, state: AdaptationState, stamp: int, newest: Lagging) -> AdaptationState:
+def _interrupted(settings: AdaptationSettings, state: AdaptationState, stamp: int, newest: Signals) -> AdaptationState:
     """State after a gap: signals and strokes begin anew."""
     rest = replace(NO_REST, slid=stamp, held=state.rest.held)
     strokes = Strokes(NO_STROKE, NO_STROKE, state.strokes.ratio, state.strokes.reversals)
     outlook = outlook_of(settings, state.filter, state.way, 0.0, False, False)
     return replace(
-        state, stamp=stamp, once=newest, twice=newest, acceleration=0.0, strokes=strokes, rest=rest, outlook=outlook,
-        since_turn=0.0, accelerations=NO_ACCELERATIONS,
+        state, stamp=stamp, motion=Motion(newest, newest, newest, 0.0, 0.0, newest.friction), strokes=strokes,
+        rest=rest, outlook=outlook, since_turn=0.0, accelerations=NO_ACCELERATIONS,
     )  # fmt: skip
 
 
@@ -340,13 +346,13 @@ def _moved(known: FrictionFilter, way: float) -> FrictionFilter:
 @compilable
 def _rested(settings: AdaptationSettings, state: AdaptationState, slide: Slide, direction: int, elapsed: float) -> Rest:
     """What the force sum has done in this rest, after one more sample."""
-    before, outlook = state.rest, state.outlook
-    change, leap = slide.force_sum - state.twice.force_sum, slide.force_sum - state.once.force_sum
+    before, outlook, motion = state.rest, state.outlook, state.motion
+    change, leap = slide.force_sum - motion.twice.force_sum, slide.force_sum - motion.once.force_sum
     ripple = before.ripple + elapsed / (elapsed + RIPPLE_TIME) * (change * change - before.ripple)
     held = before.held * (1.0 - elapsed / USUAL_TIME)
     if direction != 0:
         loaded = before.loaded * (1.0 - elapsed / LOADED_TIME)
-        return Rest(slide.stamp, ripple, 0.0, 0.0, NEVER, loaded, held)
+        return Rest(slide.stamp, ripple, 0.0, 0.0, NEVER, loaded, held, before.left)
     beyond = abs(slide.force_sum - outlook.offset) - outlook.scale * slide.friction
     most = (settings.scale_max - outlook.scale) * slide.friction
     if slide.is_usable and outlook.is_proven and beyond > held and (slide.stamp - before.slid) * 1e-9 >= REST:
@@ -359,7 +365,7 @@ def _rested(settings: AdaptationSettings, state: AdaptationState, slide: Slide, 
     is_larger = abs(leap) > abs(leapt) or (is_of_motion and (slide.stamp - before.slid) * 1e-9 >= REST)
     if slide.is_usable and is_larger and abs(leap) > LEAP_AT_REST * slide.friction:
         leapt, leapt_at = leap, slide.stamp
-    return Rest(before.slid, ripple, pressed, leapt, leapt_at, loaded, held)
+    return Rest(before.slid, ripple, pressed, leapt, leapt_at, loaded, held, before.left)
 
 
 @compilable
@@ -390,23 +396,21 @@ def _with_reading(strokes: Strokes, reading: Reading, is_identified: bool) -> St
 
 
 @compilable
-def _middle(before: Lagging, after: Lagging) -> Lagging:
-    """Means of two samples: of the same time as the acceleration between them."""
-    return Lagging(
-        0.5 * (before.velocity + after.velocity),
-        0.5 * (before.force_sum + after.force_sum),
-        0.5 * (before.friction + after.friction),
-    )
+def _motion_after(before: Motion, newest: Signals, elapsed: float) -> Motion:
+    """Motion after one more sample."""
+    once, at_first = _middle(before.newest, newest), (newest.velocity - before.newest.velocity) / elapsed
+    settled = before.settled + elapsed / (elapsed + SETTLING) * (newest.friction - before.settled)
+    acceleration = 0.5 * (before.at_first + at_first)
+    return Motion(newest, once, _middle(before.once, once), at_first, acceleration, settled)
 
 
 @compilable
-def _lagging(before: Lagging, newest: Lagging, share: float) -> Lagging:
-    """Signals after one more lag."""
-    velocity, force_sum, friction = before
-    return Lagging(
-        velocity + share * (newest.velocity - velocity),
-        force_sum + share * (newest.force_sum - force_sum),
-        friction + share * (newest.friction - friction),
+def _middle(before: Signals, after: Signals) -> Signals:
+    """Means of two."""
+    return Signals(
+        0.5 * (before.velocity + after.velocity),
+        0.5 * (before.force_sum + after.force_sum),
+        0.5 * (before.friction + after.friction),
     )
 
 
@@ -435,7 +439,7 @@ def _is_readable(
         slide: The sample.
         inertia: Given or learnt.
         since_turn: Way [m]: elastic seals do not slide at once.
-        acceleration: [m/s^2] the larger one after one lag, which shows a change earlier, and after two.
+        acceleration: [m/s^2] the larger one of the last interval, which shows a change earlier, and of two.
     """
     is_even = acceleration <= settings.acceleration_max
     if is_inertia_known(inertia, acceleration, slide.friction):
@@ -490,7 +494,7 @@ def outlook_of(
 
 
 @compilable
-def _is_outlier(state: AdaptationState, newest: Lagging) -> bool:
+def _is_outlier(state: AdaptationState, newest: Signals) -> bool:
     """Whether a sample of a sliding rod is more than `OUTLIER` standard deviations from what was expected."""
     direction = 1.0 if newest.velocity > 0.0 else -1.0
     found = friction_magnitude(state.filter.terms, direction, abs(newest.velocity), newest.friction * direction)
@@ -684,13 +688,14 @@ def _std_at_rest(state: AdaptationState, stamp: int, force_sum: float, most: flo
     known, rest, spread, way = state.filter, state.rest, state.filter.covariance, state.way
     if known.stamp == NEVER or (stamp - rest.slid) * 1e-9 < REST:
         return most
-    change = force_sum - state.twice.force_sum
+    change = force_sum - state.motion.twice.force_sum
     noise = change * change if change * change > rest.ripple else rest.ripple
     offset = spread.bb + way * (2.0 * spread.bg + way * spread.gg)
     remainder = known.terms.remainder  # at rest nothing tells it from the offset
     step = known.outliers.last if known.outliers.number != 0 else 0.0  # it may have begun
     strayed = known.strayed + way * (known.terms.gradient - known.gradient)
     variance = offset + remainder * remainder + strayed * strayed + rest.leapt * rest.leapt + step * step
+    variance += rest.left * rest.left
     variance += AT_ONCE * AT_ONCE * (known.unexplained.square + noise)
     std = math.sqrt(variance) if variance > 0.0 else 0.0
     unseen = known.load_step / ONE_SIDED_95  # the seals would hold it

@@ -571,7 +571,7 @@ def _moment_of_seals(
     estimate: FrictionEstimate,
 ) -> Moment:
     """A sample as seals that shear take it, less what is known not to be friction."""
-    inertia, coulomb = settings.moving_mass * known.acceleration, friction.coulomb_friction
+    inertia, coulomb = settings.moving_mass * known.motion.acceleration, friction.coulomb_friction
     is_small = abs(inertia) <= LARGEST_INERTIA * coulomb
     return Moment(
         stamp=seen.stamp, velocity=measured, direction=sign(seen.velocity),

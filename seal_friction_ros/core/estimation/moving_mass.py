@@ -63,25 +63,32 @@ class Inertia(NamedTuple):
     mass: float  # [kg]
     std: float  # [kg] root mean square of what it leaves
     shown: float  # [m/s^2] acceleration up to which the strokes show it
+    is_given: bool
 
 
 @compilable
 def inertia_of(given: float, known: MovingMass) -> Inertia:
-    """Inertia of a ``given`` mass [kg], or of the learnt one where that is 0.0, as far as the strokes agree with it."""
+    """Inertia of a ``given`` mass [kg], or of the learnt one where that is 0.0, and what it leaves of the strokes."""
     if known.square <= 0.0:
-        return Inertia(given, 0.0, math.inf if given > 0.0 else -1.0)
+        return Inertia(given, 0.0, math.inf if given > 0.0 else -1.0, given > 0.0)
     learnt = known.inertia / known.square
     learnt = learnt if learnt > 0.0 else 0.0  # a negative one is a delay or elastic seals, and stands in the deviation
     mass = given if given > 0.0 else learnt
     variance = (known.force_square - 2.0 * mass * known.inertia) / known.square + mass * mass
-    std, shown = math.sqrt(variance) if variance > 0.0 else 0.0, BEYOND * math.sqrt(known.square / known.time)
-    return Inertia(mass, std, math.inf if given > 0.0 else shown)
+    std = math.sqrt(variance) if variance > 0.0 else 0.0
+    return Inertia(mass, std, BEYOND * math.sqrt(known.square / known.time), given > 0.0)
 
 
 @compilable
 def is_inertia_known(inertia: Inertia, acceleration: float, friction: float) -> bool:
-    """Whether the inertia at an ``acceleration`` [m/s^2] is known well enough beside the ``friction`` [N]."""
-    return abs(acceleration) <= inertia.shown and inertia.std * abs(acceleration) <= UNSURE * friction
+    """Whether the inertia at an ``acceleration`` [m/s^2] is known well enough beside the ``friction`` [N].
+
+    A given mass leaves as much at higher accelerations as at those of the strokes: friction of the position does.
+    """
+    size, usual = abs(acceleration), inertia.shown / BEYOND
+    if inertia.is_given:
+        size = size if size < usual else usual
+    return size <= inertia.shown and inertia.std * size <= UNSURE * friction
 
 
 @compilable

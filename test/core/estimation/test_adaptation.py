@@ -142,7 +142,7 @@ def test_the_residual_is_what_friction_offset_and_inertia_leave_of_the_force_sum
     known, seen = replace(parameters(mode), adaptation=AdaptationSettings(mode, moving_mass=7.0)), 0
     state = estimator.init(known)
     for sample in samples(replace(DAY, scale=lambda _: 1.4), 8.0, 1):
-        inertia = 7.0 * state.adaptation.acceleration
+        inertia = 7.0 * state.adaptation.motion.acceleration
         state, estimate = step(known, state, sample)
         if estimate.state == SLIDING:
             left = sample.force.force - estimate.friction_force - estimate.adaptation_offset - inertia
@@ -567,7 +567,7 @@ def test_after_a_gap_of_more_than_100_ms_or_a_step_back_acceleration_and_strokes
     after = adapt(SETTINGS, state, EVEN._replace(stamp=state.stamp + round(gap * SECOND)))
     assert (after.strokes.present != NO_STROKE) is is_known
     if not is_known:
-        assert after.acceleration == 0.0
+        assert after.motion.acceleration == 0.0
         assert after.filter == state.filter
 
 

@@ -857,7 +857,7 @@ def test_while_seals_shear_the_residual_is_what_friction_offset_and_inertia_leav
         stamp = START + i * MS
         velocity = 0.01 if i % 300 < 150 else -0.01
         force = 50.0 if velocity > 0.0 else -30.0
-        acceleration = state.adaptation.acceleration
+        acceleration = state.adaptation.motion.acceleration
         sample = RodSample(stamp, velocity, Pressure(stamp, PRESSURE, PRESSURE), Force(stamp, force))
         state, estimate = step(known, state, sample)
         if estimate.status & Status.PRESLIDING and estimate.residual != 0.0:
@@ -895,7 +895,12 @@ def test_the_force_sum_of_a_rod_that_stopped_counts_if_its_inertia_is_at_most_ha
     acceleration = inertia * estimate.coulomb_friction / mass
     known_filter = state.adaptation.filter
     learnt = known_filter._replace(terms=known_filter.terms._replace(offset=3.0, remainder=0.0))
-    state.adaptation = learnt_state(state.adaptation, known.adaptation, acceleration=acceleration, filter=learnt)
+    state.adaptation = learnt_state(
+        state.adaptation,
+        known.adaptation,
+        motion=state.adaptation.motion._replace(acceleration=acceleration),
+        filter=learnt,
+    )
     at = stamp + MS
     _, stopped = step(known, state, RodSample(at, 0.0, Pressure(at, PRESSURE, PRESSURE), Force(at, -5.0)))
     expected = -5.0 - 3.0 - mass * acceleration
