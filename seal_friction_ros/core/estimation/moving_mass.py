@@ -12,9 +12,8 @@ where the bar is the integral over the time of a part, of deviations from its me
 and weighs each by its mean square acceleration: what a slow stroke leaves says little of the inertia of a fast one.
 :math:`\sigma |a|` is not the error of a mean, which falls with the number of strokes: what a delay, elastic seals or
 friction of the position leave is the same in each of them. On real logs it decides whether a sample of an accelerated
-rod is a reading at all, also with a mass that is given: then :math:`\sigma` is what that one leaves. A load over the
-position counts as a mass where strokes are alike: both are no friction. Nothing of the filter comes in,
-so its errors cannot feed themselves.
+rod is a reading at all. A load over the position counts as a mass where strokes are alike: both are no friction.
+Nothing of the filter comes in, so its errors cannot feed themselves.
 
 Source: least squares by parts of strokes; the orthogonality is the integral above. Model and numbers are our choice.
 """
@@ -63,32 +62,26 @@ class Inertia(NamedTuple):
     mass: float  # [kg]
     std: float  # [kg] root mean square of what it leaves
     shown: float  # [m/s^2] acceleration up to which the strokes show it
-    is_given: bool
 
 
 @compilable
 def inertia_of(given: float, known: MovingMass) -> Inertia:
-    """Inertia of a ``given`` mass [kg], or of the learnt one where that is 0.0, and what it leaves of the strokes."""
+    """Inertia of a ``given`` mass [kg], which is taken as exact, or of the learnt one where that is 0.0."""
+    if given > 0.0:
+        return Inertia(given, 0.0, math.inf)
     if known.square <= 0.0:
-        return Inertia(given, 0.0, math.inf if given > 0.0 else -1.0, given > 0.0)
-    learnt = known.inertia / known.square
-    learnt = learnt if learnt > 0.0 else 0.0  # a negative one is a delay or elastic seals, and stands in the deviation
-    mass = given if given > 0.0 else learnt
+        return Inertia(0.0, 0.0, -1.0)
+    mass = known.inertia / known.square
+    mass = mass if mass > 0.0 else 0.0  # a negative one is a delay or elastic seals, and stands in the deviation
     variance = (known.force_square - 2.0 * mass * known.inertia) / known.square + mass * mass
     std = math.sqrt(variance) if variance > 0.0 else 0.0
-    return Inertia(mass, std, BEYOND * math.sqrt(known.square / known.time), given > 0.0)
+    return Inertia(mass, std, BEYOND * math.sqrt(known.square / known.time))
 
 
 @compilable
 def is_inertia_known(inertia: Inertia, acceleration: float, friction: float) -> bool:
-    """Whether the inertia at an ``acceleration`` [m/s^2] is known well enough beside the ``friction`` [N].
-
-    A given mass leaves as much at higher accelerations as at those of the strokes: friction of the position does.
-    """
-    size, usual = abs(acceleration), inertia.shown / BEYOND
-    if inertia.is_given:
-        size = size if size < usual else usual
-    return size <= inertia.shown and inertia.std * size <= UNSURE * friction
+    """Whether the inertia at an ``acceleration`` [m/s^2] is known well enough beside the ``friction`` [N]."""
+    return abs(acceleration) <= inertia.shown and inertia.std * abs(acceleration) <= UNSURE * friction
 
 
 @compilable

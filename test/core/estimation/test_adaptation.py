@@ -437,6 +437,21 @@ def test_a_step_that_has_begun_when_the_rod_comes_to_rest_is_in_the_deviation_th
     assert BAND_95 * std > 40.0
 
 
+def test_what_a_braking_rod_of_unknown_mass_leaves_of_the_force_sum_is_in_the_deviation_at_rest():
+    """It may be inertia, or the load of a boom."""
+    stds = []
+    for load in (0.0, 20.0):
+        taught = adapted(strokes(10.0, friction=40.0))
+        start = taught.stamp + SECOND // 100
+        braking = moving(0.2, lambda t: 0.021 - 0.1 * t, lambda _, load=load: 40.0 + load, start)
+        braked = adapted(braking, state=taught)
+        rest = moving(1.0, lambda _: 0.0, lambda _, load=load: 36.0 + load, braked.stamp + SECOND // 100)
+        rested, by_file = adapted(rest, state=braked), ActuatorFriction(40.0, 2.0, 60.0, True, 0.0, 0.0)
+        stds.append(friction_at_rest(SETTINGS, rested, by_file, rested.stamp, 36.0 + load, True)[1])
+    assert stds[0] < 10.0
+    assert stds[1] > 20.0
+
+
 def test_a_load_as_large_as_the_last_may_come_at_rest_where_nothing_shows_it():
     """The seals hold a payload of half their friction that is put down slowly."""
 

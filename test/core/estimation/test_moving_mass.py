@@ -8,7 +8,6 @@ from seal_friction_ros.core.estimation.moving_mass import (
     BEYOND,
     NO_ACCELERATIONS,
     NO_MASS,
-    UNSURE,
     Accelerations,
     accelerated,
     inertia_of,
@@ -84,20 +83,11 @@ def test_another_payload_is_learnt_within_a_few_strokes():
     assert inertia_of(0.0, known).mass == pytest.approx(50.0, rel=0.1)
 
 
-def test_a_given_mass_holds_at_any_acceleration_unless_strokes_contradict_it():
-    assert is_inertia_known(inertia_of(20.0, NO_MASS), 1e6, 40.0)
-    right, wrong = (after_stroke(NO_MASS, stroke(lambda _, a, m=m: m * a)) for m in (20.0, 5.0))
-    assert is_inertia_known(inertia_of(20.0, right), 1e6, 40.0)
+def test_a_given_mass_is_exact_at_any_acceleration():
+    wrong = after_stroke(NO_MASS, stroke(lambda _, a: 5.0 * a))
     inertia = inertia_of(20.0, wrong)
-    assert (inertia.mass, inertia.std) == (20.0, pytest.approx(15.0))
-    assert not is_inertia_known(inertia, 1e6, UNSURE * 40.0)
-
-
-def test_what_slow_strokes_leave_is_no_more_at_a_higher_acceleration_of_a_given_mass():
-    """Friction of the position leaves as much there."""
-    slow = after_stroke(NO_MASS, stroke(lambda v, a: 20.0 * a + math.copysign(5.0, a * v)))
-    assert is_inertia_known(inertia_of(20.0, slow), 1e6, 40.0)
-    assert not is_inertia_known(inertia_of(0.0, slow), 1e6, 40.0)
+    assert inertia.mass == 20.0
+    assert is_inertia_known(inertia, 1e6, 40.0)
 
 
 def test_before_a_stroke_and_beyond_the_accelerations_of_the_strokes_nothing_is_known():
