@@ -276,7 +276,7 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     if not 0.0 < elapsed <= LONGEST_STEP:
         return _interrupted(settings, state, slide.stamp, newest)
     before, motion = state.motion.twice, _motion_after(state.motion, newest, elapsed)
-    twice, at_first, acceleration = motion.twice, motion.at_first, motion.acceleration
+    twice, acceleration = motion.twice, motion.acceleration
     rest = _rested(settings, state, slide, direction, elapsed)
     known, strokes, rate = state.filter, state.strokes, state.inertia_rate
     speed, fastest = abs(velocity), state.fastest * (1.0 - elapsed / USUAL_TIME)
@@ -286,7 +286,7 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     inertia = inertia_of(settings.moving_mass, mass)
     knows_inertia = is_inertia_known(inertia, acceleration, friction)
     of_inertia = inertia.mass * acceleration if knows_inertia else 0.0
-    largest = abs(acceleration) if abs(acceleration) > abs(at_first) else abs(at_first)
+    largest = _largest_acceleration(state.motion, motion)
     is_readable = _is_readable(settings, slide, inertia, since_turn, largest) and direction != 0
     fastest = speed if is_readable and speed > fastest else fastest
     may_rest = speed < slide.slow <= fastest  # a rod that is never faster could not be learnt from at all
@@ -405,6 +405,14 @@ def _motion_after(before: Motion, newest: Signals, elapsed: float) -> Motion:
 
 
 @compilable
+def _largest_acceleration(before: Motion, motion: Motion) -> float:
+    """Largest acceleration about the samples of the means [m/s^2]: the first may have that of the interval before."""
+    largest, earlier = abs(motion.at_first), abs(before.acceleration)
+    largest = largest if largest > earlier else earlier
+    return largest if largest > abs(motion.acceleration) else abs(motion.acceleration)
+
+
+@compilable
 def _middle(before: Signals, after: Signals) -> Signals:
     """Means of two."""
     return Signals(
@@ -439,7 +447,7 @@ def _is_readable(
         slide: The sample.
         inertia: Given or learnt.
         since_turn: Way [m]: elastic seals do not slide at once.
-        acceleration: [m/s^2] the larger one of the last interval, which shows a change earlier, and of two.
+        acceleration: [m/s^2] the largest one (`_largest_acceleration`).
     """
     is_even = acceleration <= settings.acceleration_max
     if is_inertia_known(inertia, acceleration, slide.friction):

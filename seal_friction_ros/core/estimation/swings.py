@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 from seal_friction_ros.core.foundation.compiled import compilable, replace
 
-LONGEST_SWING = 2e-3  # [m] longer strokes are not judged
+LONGEST_SWING = 2.2e-3  # [m] longer strokes are not judged; shorter ones hold a hum of 20 mm/s from 3 Hz on
 LONGEST_STEP = 0.02  # [s] a longer time between two samples counts as this one
 LEAST_SHARE = 0.5  # [-] of the friction of the estimate that the force sum must show
 MUCH_LONGER = 4.0  # [-] a stroke of this multiple of the strokes in doubt is a motion of its own
