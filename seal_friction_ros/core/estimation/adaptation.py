@@ -1,9 +1,9 @@
 r"""What the motion teaches about the friction: signals made ready for the filter, and what its innovations say.
 
 While the rod slides evenly, or its inertia is known (`moving_mass`), the force sum less inertia is a reading for the
-`friction_filter`. Force sum, friction of the law
-and velocity are **means over the two intervals before**, as the acceleration is: by the trapezoidal rule inertia and
-friction are compared at one and the same time. Nothing is learnt at rest or with a bad input.
+`friction_filter`. Force sum, friction of the law and velocity are **means over the two intervals before**, as the
+acceleration is: by the trapezoidal rule inertia and friction are compared at one and the same time. Nothing is learnt
+at rest or with a bad input.
 
 **Consistency.** Each sample of a sliding rod is compared with what the filter expects. What drifts beside that widens
 the band: it may be friction. An innovation of more than `IMPLAUSIBLE` standard deviations is not explained by anything

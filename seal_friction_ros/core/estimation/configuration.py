@@ -187,7 +187,8 @@ until a sudden change of the force sum at rest might be a load at the next rever
 a reading, and the band just after a turn held both directions. 11: until even samples counted by their way in a stroke,
 a step widened the band without a bit, and the prior of the asymmetry was 0.1. 12: until a drift below half the friction
 widened the band without a bit. 13: until the moving mass was learnt from accelerations in place of the work of strokes,
-and a friction that differs from that of the file by less than 1 % kept it.
+and a friction that differs from that of the file by less than 1 % kept it. 14: until a step was one of the load unless
+the next stroke showed friction, and the signals of a reading were means over two intervals.
 """
 
 _RENAMED = {'coulomb_scale': 'scale'}  # settings of version 1
