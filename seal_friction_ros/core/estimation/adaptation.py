@@ -316,7 +316,7 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     outlook = outlook_of(settings, known, way, of_inertia, may_have_inertia, speed < slide.slow <= fastest)
     by_motion = known if fastest >= slide.slow else by_motion
     if direction != 0 and slide.is_usable and known.stamp != NEVER:
-        found = friction_magnitude(known.terms, direction, speed, friction)
+        found = friction_magnitude(known.terms, float(direction), speed, friction)
         rest = replace(rest, left=twice.force_sum - outlook.taken_off - direction * found)
     return AdaptationState(
         slide.stamp, motion, way, fastest, rate, known, by_motion, strokes, rest, outlook, mass, since_turn, sums,
