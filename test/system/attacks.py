@@ -1,8 +1,8 @@
 """Status 0 under attack: a rod on strokes and rests with exact rigid friction, and what sensors and loads do to it.
 
-``python test/system/attacks.py [--mass 0 | --random 100]``. Wrong is a sample with status 0 whose friction force is
-outside the 95 % band; the first 2 s do not count. Exit code 1 if more than 0.5 % of the samples with status 0 of an
-attack are wrong, or fewer than 80 % of the samples of a clean machine have status 0.
+``python test/system/attacks.py [--mass 0 | --random 100 [--first 400]]``. Wrong is a sample with status 0 whose
+friction force is outside the 95 % band; the first 2 s do not count. Exit code 1 if more than 0.5 % of the samples with
+status 0 of an attack are wrong, or fewer than 80 % of the samples of a clean machine have status 0.
 
 ``--random`` instead draws so many machines, each by its number: mass, known or not, strokes or sines, and one to three
 attacks at once (of two that change the velocity the later one counts). Exit code 1 if more than 0.5 % of all samples
@@ -290,17 +290,19 @@ def main() -> int:
         seconds=(40.0, 'of an attack [s]'),
         workers=(2, 'processes'),
         random=(0, 'machines instead'),
+        first=(0, 'number of the first of them'),
         mass=(MASS, 'that the estimator knows; 0: unknown [kg]'),
     )
     arguments = parser.parse_args()
-    cases = [(name, mode) for name in range(arguments.random) or CLEAN | ATTACKS for mode in ('observe', 'on')]
+    numbers = range(arguments.first, arguments.first + arguments.random)
+    cases = [(name, mode) for name in numbers or CLEAN | ATTACKS for mode in ('observe', 'on')]
     with ProcessPoolExecutor(arguments.workers) as pool:
         found = list(pool.map(partial(_attacked, arguments.seconds, arguments.mass), cases))
     rows = [{'case': said, 'mode': mode, **one._asdict()} for (_, mode), (said, one) in zip(cases, found, strict=True)]
     if arguments.random:
         good, wrong = np.mean([(one.good, one.good * one.wrong) for _, one in found], axis=0).tolist()
         whole = Found(good, wrong / max(good, 1e-12))
-        rows = [{'case': f'all of {arguments.random} machines', 'mode': 'both', **whole._asdict()}, *rows]
+        rows = [{'case': f'all of {len(numbers)} machines', 'mode': 'both', **whole._asdict()}, *rows]
         tell(rows, as_json=arguments.json, title='shares of samples')
         return int(whole.wrong > MOST_WRONG)
     tell(rows, as_json=arguments.json, title='shares of samples')
